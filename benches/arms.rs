@@ -8,10 +8,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use nalgebra::{Matrix3, Vector3};
-use residyn::expr::Program;
-use residyn::lanes::{Element, Row};
-use residyn::model::chain::{Chain, Drivetrain, Inertia, Joint, Pose, model_text};
-use residyn::model::{Library, Model};
+use residyn::read_model;
+use residyn_core::expr::Program;
+use residyn_core::lanes::{Element, Row};
+use residyn_core::model::chain::{Chain, Drivetrain, Inertia, Joint, Pose, model_text};
+use residyn_core::model::{Library, Model};
 
 /// Of each time the best of so many.
 const REPEATS: usize = 7;
@@ -111,8 +112,6 @@ fn main() {
         env!("CARGO_MANIFEST_DIR"),
         "/../configs/bench/arm-seven.toml"
     );
-    let arm = Library::built_in()
-        .model(arm)
-        .expect("the arm of the bench");
+    let arm = read_model(arm, &Library::built_in()).expect("the arm of the bench");
     tell(&arm, &"arm".into());
 }

@@ -12,12 +12,13 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use residyn::closeloop::{self, Request, Split, close_loop};
-use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
-use residyn::model::{Dynamics, Library, MlpSettings, MlpWeights};
-use residyn::plan::Start;
-use residyn::plant::Plant;
-use residyn::sim::batch::{Rollouts, Rows};
+use residyn::read_plant;
+use residyn_control::plan::Start;
+use residyn_core::closeloop;
+use residyn_core::closeloop::{Request, Split, close_loop};
+use residyn_core::lanes::{Arch, Element, Simd, Vector, WithSimd};
+use residyn_core::model::{Dynamics, Library, MlpSettings, MlpWeights};
+use residyn_core::sim::batch::{Rollouts, Rows};
 
 /// One of the two systems on which the published method was tried.
 struct Task {
@@ -174,13 +175,11 @@ fn lanes(arch: Arch) -> usize {
 fn identify(c: &mut Criterion) {
     let library = Library::built_in();
     let demo = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/demo.toml"));
-    let rig = Plant::read(demo, &library).expect("the demo's rig");
+    let rig = read_plant(demo, &library).expect("the demo's rig");
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let logs = (0..rig.recording.logs).map(|_| rig.record(&mut rng).expect("a log"));
     let split = Split::of(logs.collect(), &closeloop::Settings::default().split);
-    let system = library
-        .model(Path::new("pendulum"))
-        .expect("a built-in system");
+    let system = library.model("pendulum").expect("a built-in system");
     let mut group = c.benchmark_group("identify");
     group.sample_size(10).bench_function("demo", |b| {
         b.iter(|| {

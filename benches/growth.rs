@@ -12,11 +12,11 @@ use std::time::Instant;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use residyn::identify::{Shooting, cut, fit};
-use residyn::model::{Dynamics, Library, MlpSettings, MlpWeights, Model};
-use residyn::plan::Start;
-use residyn::plant::Plant;
-use residyn::train::Progress;
+use residyn::read_plant;
+use residyn_control::plan::Start;
+use residyn_core::identify::{Shooting, cut, fit};
+use residyn_core::model::{Dynamics, Library, MlpSettings, MlpWeights, Model};
+use residyn_train::Progress;
 
 /// Of each time the best of so many.
 const REPEATS: usize = 5;
@@ -118,7 +118,7 @@ fn chain(joints: usize) -> Dynamics {
 /// Seconds of fitting the pendulum to logs of this length.
 fn identification(duration_s: f64) -> f64 {
     let library = Library::built_in();
-    let mut rig = Plant::read(Path::new("pendulum"), &library).expect("a built-in system");
+    let mut rig = read_plant(Path::new("pendulum"), &library).expect("a built-in system");
     rig.recording.duration_s = duration_s;
     let log = rig
         .record(&mut ChaCha8Rng::seed_from_u64(5))

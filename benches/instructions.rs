@@ -11,11 +11,11 @@ use std::path::Path;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use residyn::data::Log;
-use residyn::identify::{Shooting, cut, predicted_cost};
-use residyn::model::{Library, MlpSettings, MlpWeights};
-use residyn::plant::Plant;
-use residyn::sim::batch::Rows;
+use residyn::read_plant;
+use residyn_core::data::Log;
+use residyn_core::identify::{Shooting, cut, predicted_cost};
+use residyn_core::model::{Library, MlpSettings, MlpWeights};
+use residyn_core::sim::batch::Rows;
 
 use work::{dynamics, rollouts, segments, training};
 
@@ -75,7 +75,7 @@ fn epochs(name: &str, times: usize) {
 
 /// A swing with a torque, recorded without noise.
 fn log() -> Log {
-    let rig = Plant::read(Path::new("pendulum"), &Library::built_in()).expect("a built-in rig");
+    let rig = read_plant(Path::new("pendulum"), &Library::built_in()).expect("a built-in rig");
     let log = rig.record(&mut ChaCha8Rng::seed_from_u64(4));
     log.expect("a rig that does not diverge")
 }

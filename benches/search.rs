@@ -2,8 +2,8 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use residyn::plan::{Cem, Method, Planner, Settings};
-use residyn::sim::batch::{Block, Rollouts};
+use residyn_control::plan::{Cem, Method, Planner, Settings};
+use residyn_core::sim::batch::{Block, Rollouts};
 
 /// A cross-entropy search of 10 iterations for torques within 3 N m.
 pub fn planner(rollouts: &Rollouts, population: usize, horizon: usize) -> Planner<Block<'_>> {

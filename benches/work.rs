@@ -1,21 +1,19 @@
 //! The models, data and engines that all benches measure, the same in every run.
 
-use std::path::Path;
-
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights};
-use residyn::plan::Objective;
-use residyn::sim::Integrator;
-use residyn::sim::batch::Rollouts;
-use residyn::train::{Backend, FitSettings, HybridModel, Segments, Training};
+use residyn_control::plan::Objective;
+use residyn_core::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights};
+use residyn_core::sim::Integrator;
+use residyn_core::sim::batch::Rollouts;
+use residyn_train::{Backend, FitSettings, HybridModel, Segments, Training};
 
 /// How long a torque is held, s.
 pub const STEP_S: f64 = 0.02;
 
 /// The equations of a built-in system.
 pub fn dynamics(name: &str) -> Dynamics {
-    let system = Library::built_in().model(Path::new(name));
+    let system = Library::built_in().model(name);
     system.expect("a built-in system").dynamics()
 }
 

@@ -3,11 +3,12 @@
 use std::fs;
 use std::path::PathBuf;
 
-use residyn::data::{Interval, Joint};
-use residyn::identify::fit_torques;
-use residyn::model::chain::Inertia;
-use residyn::model::{FittedEffect, Library, Model};
-use residyn::sim::metric::torque_error;
+use residyn::read_log;
+use residyn_core::data::{Interval, Joint};
+use residyn_core::identify::fit_torques;
+use residyn_core::model::chain::Inertia;
+use residyn_core::model::{FittedEffect, Library, Model};
+use residyn_core::sim::metric::torque_error;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -309,7 +310,7 @@ fn fitted_torques_of_measured_arms_are_as_near_as_by_least_squares() {
             continue;
         };
         let declared = model(&read_to(&data.join(format!("{arm}.urdf")), None));
-        let log = |name: &str| declared.read_log(data.join(name)).unwrap();
+        let log = |name: &str| read_log(data.join(name), &declared).unwrap();
         let [mut train, mut test] = [log(train), log(test)];
         let split_s = train.time[((train.rows() - 1) as f64 * share) as usize];
         let span = |start_s: f64, end_s: f64| Interval { start_s, end_s };

@@ -4,9 +4,11 @@ use std::path::Path;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use residyn::bench::{Cell, Group, Hidden, Mechanics, Source, read, recorded};
-use residyn::model::{FittedEffect, Library};
-use residyn::sim::metric::assess;
+use residyn::read_model;
+use residyn_core::model::{FittedEffect, Library};
+use residyn_core::sim::metric::assess;
+use residyn_io::write_log;
+use residyn_validation::{Cell, Group, Hidden, Mechanics, Source, read, recorded};
 
 use crate::support::{refuses, succeeds, text};
 
@@ -125,10 +127,10 @@ fn logs_recorded_by_another_program_are_cells() {
     let rig = folder.path().join("rig-01");
     std::fs::create_dir(&rig).unwrap();
     let cell = &read(&path("smoke.toml")).unwrap()[0];
-    let system = Library::built_in().model(&cell.model).unwrap();
+    let system = read_model(&cell.model, &Library::built_in()).unwrap();
     let (logs, truth) = cell.record(&system).unwrap();
     for log in &logs {
-        log.write(rig.join(&log.path)).unwrap();
+        write_log(log, rig.join(&log.path)).unwrap();
     }
     let described = serde_json::json!({
         "group": "single", "plant": "rig", "recorded_by": "another", "model": "pendulum",
@@ -172,7 +174,7 @@ mod slow {
             condition.rate_hz = 500.0;
             condition.logs = 2;
             condition.seconds = 6.0;
-            let system = library.model(&cell.model).unwrap();
+            let system = read_model(&cell.model, &library).unwrap();
             let (logs, _) = cell.record(&system).unwrap();
             let error = |effects: &[FittedEffect]| {
                 let rig = system.with_effects(effects.to_vec());

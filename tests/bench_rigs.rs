@@ -3,13 +3,14 @@
 use std::env;
 use std::fs;
 
-use residyn::bench::rigs::{
+use residyn::read_model;
+use residyn_core::closeloop::Settings;
+use residyn_core::model::Library;
+use residyn_formats::ClientError;
+use residyn_validation::rigs::{
     Fold, Line, LogErrors, Measured, Method, RigsError, Squares, Task, Tools, errors_on, read,
     summarise,
 };
-use residyn::closeloop::Settings;
-use residyn::formats::ClientError;
-use residyn::model::Library;
 use serde_json::Value;
 
 use crate::support::bench::{Bench, RIGS};
@@ -52,7 +53,7 @@ fn the_rigs_of_the_repository_are_read() {
     for rig in &rigs {
         let sets = rig.published.iter().map(|set| &set.model);
         for declared in sets.chain([&rig.declared]) {
-            let model = library.model(&declared.model).unwrap();
+            let model = read_model(&declared.model, &library).unwrap();
             for name in declared.parameters.keys() {
                 assert!(
                     model.parameters.iter().any(|p| p.name == *name),

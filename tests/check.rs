@@ -3,10 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use residyn::data::Joint;
-use residyn::model::FittedEffect;
-use residyn::model::check::{Check, Finding, Kind, Severity};
+use residyn::with_effects_in;
 use residyn::{Library, Model, rng};
+use residyn_core::data::Joint;
+use residyn_core::model::FittedEffect;
+use residyn_core::model::check::{Check, Finding, Kind, Severity};
 
 use crate::support::{refuses, residyn, succeeds, text};
 
@@ -201,7 +202,7 @@ fn parameters_of_effects_are_looked_at() {
     let effect = "[effect]\nname = \"drag\"\nabout = \"drag\"\nforce = \"-c*qd*abs(qd)*sin(q)\"\n\
         [parameters]\nc = { unit = \"N m\", typical = 1 }\nq = { unit = \"1\", typical = 1 }\nd = { unit = \"1\", typical = 1 }\n";
     fs::write(folder.path().join("drag.toml"), effect).unwrap();
-    let library = Library::built_in().with_folder(folder.path()).unwrap();
+    let library = with_effects_in(folder.path(), Library::built_in()).unwrap();
     let drive = Library::system_text("drive").unwrap();
     let with = format!("{drive}\n[[effect]]\nname = \"drag\"\njoint = 1\nc = 1\nq = 1\nd = 1\n");
     let with = with.replace("[dynamics]", "c1 = { value = 1.0 }\n[dynamics]");

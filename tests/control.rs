@@ -4,12 +4,13 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-use residyn::data::{Columns, Log};
-use residyn::experiment::{Config, Session};
-use residyn::model::Library;
-use residyn::runs::Shard;
-use residyn::train::recipe::{Job, Recipe};
-use residyn::train::{Backend, Checkpoint};
+use residyn_core::data::Columns;
+use residyn_core::model::Library;
+use residyn_experiments::experiment::{Config, Session};
+use residyn_io::read_rig_log;
+use residyn_io::runs::Shard;
+use residyn_train::recipe::{Job, Recipe};
+use residyn_train::{Backend, Checkpoint};
 use serde_json::Value;
 
 use crate::support::clients::client;
@@ -43,7 +44,7 @@ fn a_model_swings_up_its_own_plant_and_the_episode_is_written() {
         assert_eq!(episode["success"], true, "{found}");
         assert_eq!(episode["decisions"], 10);
         let log = dir.path().join(format!("e/episode-{number:03}.csv"));
-        let log = Log::read(&log, 1, &Columns::default()).unwrap();
+        let log = read_rig_log(&log, 1, &Columns::default()).unwrap();
         assert_eq!(log.rows(), 501);
         // Without noise the log holds the true states; rewards are those after each step.
         let total: f64 = log.q[0][1..].iter().map(|q| q.cos()).sum();
@@ -83,7 +84,7 @@ fn options_change_the_plant() {
     ];
     let found = json(dir.path(), &[command.as_slice(), &options].concat());
     assert_eq!(found["episodes"][0]["decisions"], 100);
-    let log = Log::read(dir.path().join("e/episode-000.csv"), 1, &Columns::default()).unwrap();
+    let log = read_rig_log(dir.path().join("e/episode-000.csv"), 1, &Columns::default()).unwrap();
     let start = [log.q[0][0] - 0.1, log.qd[0][0] + 0.2];
     assert!(
         start[0] != 0.0 && start[0].abs() < 0.05 && start[1].abs() < 0.5,
@@ -165,12 +166,9 @@ fn error_of(checkpoint: &Checkpoint, recipe: &str) -> f64 {
     outcome.test_error.unwrap().after
 }
 
-fn job_dynamics(job: &Job) -> residyn::model::Dynamics {
+fn job_dynamics(job: &Job) -> residyn_core::model::Dynamics {
     let name = job.model.system().to_owned();
-    Library::built_in()
-        .model(Path::new(&name))
-        .unwrap()
-        .dynamics()
+    Library::built_in().model(&name).unwrap().dynamics()
 }
 
 /// Rounding differs between processors and grows over thousands of epochs, so what must come again everywhere is how
@@ -346,7 +344,9 @@ mod slow {
         crate::support::clients::look_at(&killed.path().join("x/report.html"));
         let stretch = killed.path().join("x/runs/hybrid-01/stretch-003.csv");
         assert_eq!(
-            Log::read(&stretch, 1, &Columns::default()).unwrap().rows(),
+            read_rig_log(&stretch, 1, &Columns::default())
+                .unwrap()
+                .rows(),
             51
         );
     }

@@ -3,11 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use residyn::data::Joint;
-use residyn::formats::{ExportModel, find};
-use residyn::model::chain::model_text;
-use residyn::sim::Integrator;
+use residyn::read_model;
 use residyn::{Library, Model};
+use residyn_core::data::Joint;
+use residyn_core::model::chain::model_text;
+use residyn_core::sim::Integrator;
+use residyn_formats::{ExportModel, find};
 use serde_json::Value;
 
 use crate::support::catalogue::{assert_near, points};
@@ -126,7 +127,7 @@ fn ready_drives_are_written_into_models() {
         ];
         succeeds(&[&flags[..], &[text(&out)]].concat());
         let library = Library::built_in();
-        let model = library.model(&out).unwrap();
+        let model = read_model(&out, &library).unwrap();
         assert_eq!(model.dynamics().program.inputs()[4], "cmd1");
         let own = |name: &str| model.parameters.iter().any(|p| p.name == name);
         assert!(
@@ -179,7 +180,7 @@ fn effects_of_the_torque_act_behind_the_drive() {
     let library = Library::built_in();
     let model = library.model("servo").unwrap();
     let gain = library.effect("actuator_gain").unwrap();
-    let mut doubled = residyn::model::FittedEffect::absent(gain, Joint::at(0));
+    let mut doubled = residyn_core::model::FittedEffect::absent(gain, Joint::at(0));
     doubled.values[0].0 = 1.0;
     let with = model.with_effects(vec![doubled]);
     let acceleration = |model: &Model, command: f64| {

@@ -5,9 +5,10 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use residyn::closeloop::{Request, close_loop};
-use residyn::train::ResidualTrainer;
-use residyn::{Library, Origin, report};
+use residyn::{Library, Origin};
+use residyn_core::closeloop::{Request, close_loop};
+use residyn_report as report;
+use residyn_train::ResidualTrainer;
 use serde_json::Value;
 
 use crate::support::catalogue::{rng, system};

@@ -1,9 +1,10 @@
 //! Every effect against its meaning, written by hand; exact sign.
 
 use rand::RngExt;
-use residyn::data::Joint;
-use residyn::expr::SignForm;
-use residyn::model::{Effect, Library};
+use residyn::with_effects_in;
+use residyn_core::data::Joint;
+use residyn_core::expr::SignForm;
+use residyn_core::model::{Effect, Library};
 
 use crate::support::arms;
 use crate::support::catalogue::{
@@ -73,7 +74,7 @@ fn values(effect: &Effect, seed: u64) -> Vec<f64> {
 }
 
 /// Random points, and each of them at rest, at a small torque and with a joint turned backwards.
-fn points_and_edges(model: &residyn::model::Dynamics, joint: usize) -> Vec<Vec<f64>> {
+fn points_and_edges(model: &residyn_core::model::Dynamics, joint: usize) -> Vec<Vec<f64>> {
     let n = model.joints;
     let plain = points(model, 40, 3);
     let with = |k: usize, value: f64| {
@@ -402,7 +403,7 @@ fn an_effect_of_a_users_folder_replaces_one_of_its_name() {
     let text = USER_EFFECT.replace("eddy_brake", "viscous_friction");
     std::fs::write(folder.path().join("any.toml"), text).unwrap();
     let built_in = Library::built_in();
-    let library = Library::built_in().with_folder(folder.path()).unwrap();
+    let library = with_effects_in(folder.path(), Library::built_in()).unwrap();
     assert_eq!(library.effects().len(), built_in.effects().len());
     let parameters = &library.effect("viscous_friction").unwrap().parameters;
     assert_eq!(parameters[0].name, "T_m");

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use residyn::control::Task;
-use residyn::formats::{Client, ExportModel, FORMATS, PythonClient, find};
-use residyn::model::Model;
-use residyn::sim::Integrator;
+use residyn_control::control::Task;
+use residyn_core::model::Model;
+use residyn_core::sim::Integrator;
+use residyn_formats::{Client, ExportModel, FORMATS, PythonClient, find};
 use serde_json::{Value, json};
 
 use crate::support::catalogue::{USER_EFFECT, rng, system};

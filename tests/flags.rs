@@ -1,9 +1,11 @@
 //! Flags belong to the command line: the library says what is wrong without them, and `src/cli` adds which flag mends it.
 
+use residyn::read_standard_log;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::paths::{crates, ours};
 use crate::support::{Scratch, refuses, says, succeeds, swinging};
 
 /// The flags that a text names: `--train` and the like.
@@ -44,9 +46,10 @@ fn the_library_names_no_flag() {
         own.contains("--train") && own.contains("--leave-out"),
         "{own:?}"
     );
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut files = Vec::new();
-    sources(&src, &src.join("cli"), &mut files);
+    for (_, folder) in crates() {
+        sources(&folder.join("src"), &ours("src/cli"), &mut files);
+    }
     assert!(files.len() > 300, "{}", files.len());
     for file in files {
         let named = flags(&fs::read_to_string(&file).unwrap());
@@ -109,8 +112,8 @@ fn a_finding_is_mended_by_a_flag_on_the_command_line_alone() {
     let output = crate::support::residyn(&["audit", &log]);
     let told = String::from_utf8(output.stdout).unwrap();
     assert!(told.contains("paste: --leave-out gap.csv@"), "{told}");
-    let log = residyn::Log::read_standard(Path::new(&log)).unwrap();
-    let audit = residyn::data::audit(&log, &residyn::data::Columns::default());
+    let log = read_standard_log(Path::new(&log)).unwrap();
+    let audit = residyn_core::data::audit(&log, &residyn_core::data::Columns::default());
     let told = audit.to_string();
     assert!(
         told.contains("leave out gap.csv@") && !told.contains("--"),

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use residyn::runs::RunFolder;
+use residyn_io::runs::RunFolder;
 
 use crate::support::bench::{Bench, RIGS};
 use crate::support::exported_models::exported;

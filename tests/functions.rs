@@ -1,7 +1,7 @@
 //! Every function that a formula may call: value and slopes, for every reader of programs.
 
-use residyn::expr::{Graph, Program, Scope, SignForm, parse};
-use residyn::train::replay;
+use residyn_core::expr::{Graph, Program, Scope, SignForm, parse};
+use residyn_train::replay;
 
 use rand::RngExt;
 
@@ -114,7 +114,7 @@ const F64: f64 = 1e-14;
 /// f32: a handful of operations of 6e-8 each; measured up to 1.5e-7.
 const F32: f64 = 1e-6;
 
-fn lower(formula: &str, sign: SignForm) -> (Graph, [residyn::expr::Node; 3]) {
+fn lower(formula: &str, sign: SignForm) -> (Graph, [residyn_core::expr::Node; 3]) {
     let mut graph = Graph::new();
     let mut scope = Scope::new(sign);
     let (x, y) = (graph.input("x"), graph.input("y"));

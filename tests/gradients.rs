@@ -2,9 +2,9 @@
 
 use burn::tensor::{Device, Tensor};
 use rand_chacha::ChaCha8Rng;
-use residyn::expr::{Program, SignForm};
-use residyn::model::Dynamics;
-use residyn::train::replay;
+use residyn_core::expr::{Program, SignForm};
+use residyn_core::model::Dynamics;
+use residyn_train::replay;
 
 use crate::support::catalogue::{
     Case, assert_near, catalog, column, in_f32, jacobian, point, points, rng,

@@ -1,12 +1,12 @@
 //! Parameters of simulated rigs come back, with honest intervals.
 
 use rand::RngExt;
-use residyn::data::{Interval, Log};
-use residyn::expr::SignForm;
-use residyn::identify::{
+use residyn_core::data::{Interval, Log};
+use residyn_core::expr::SignForm;
+use residyn_core::identify::{
     Fit, Identifiability, Shooting, Values, Window, cut, fit, identifiability, uncertainty,
 };
-use residyn::model::{Dynamics, Library};
+use residyn_core::model::{Dynamics, Library};
 
 use crate::support::catalogue::{assert_near, dynamics, fitted, rng, system};
 use crate::support::logs::{add_noise, simulate};

@@ -3,12 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use residyn::data::{Columns, Log, Quantity};
+use residyn_core::data::{Columns, Log, Quantity};
+use residyn_io::read_rig_log;
 
 use crate::support::log_files::formats;
 
 fn read(path: &Path) -> Result<Log, String> {
-    Log::read(path, 2, &Columns::default()).map_err(|error| error.to_string())
+    read_rig_log(path, 2, &Columns::default()).map_err(|error| error.to_string())
 }
 
 #[test]
@@ -102,7 +103,7 @@ mod slow {
             ..Columns::default()
         };
         let read = |name: &str| {
-            let log = Log::read(folder.join(name), 2, &rig);
+            let log = read_rig_log(folder.join(name), 2, &rig);
             log.map_err(|error| error.to_string())
         };
         let wanted = self::read(&folder.join("run.csv")).unwrap();

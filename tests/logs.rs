@@ -5,13 +5,21 @@ use std::f64::consts::{PI, TAU};
 use std::fs;
 use std::path::Path;
 
-use residyn::closeloop::{Declared, Fitted, Problem, Split, SplitMethod, Unexplained, unexplained};
-use residyn::data::{Columns, Remedy, Severity, audit};
-use residyn::expr::SignForm;
-use residyn::model::Origin;
-use residyn::plant::Plant;
-use residyn::report::{self, Report, Words, summary};
+use residyn::read_model;
+use residyn::read_standard_log;
 use residyn::{Library, Log, Model, Outcome, Request, Settings, Verdict, close_loop};
+use residyn_core::closeloop::{
+    Declared, Fitted, Problem, Split, SplitMethod, Unexplained, unexplained,
+};
+use residyn_core::data::{Columns, Remedy, Severity, audit};
+use residyn_core::expr::SignForm;
+use residyn_core::model::Origin;
+use residyn_core::plant::Plant;
+use residyn_io::plant_from_text;
+use residyn_io::read_rig_log;
+use residyn_io::write_log;
+use residyn_report as report;
+use residyn_report::{Report, Words, summary};
 use serde_json::Value;
 
 use crate::support::catalogue::{catalog, rng};
@@ -29,7 +37,7 @@ effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.2 }]
 "#;
 
 fn rig() -> Plant {
-    Plant::from_text(Path::new("rig.toml"), RIG, &Library::built_in()).unwrap()
+    plant_from_text(Path::new("rig.toml"), RIG, &Library::built_in()).unwrap()
 }
 
 /// The rig's equations, friction too.
@@ -53,7 +61,7 @@ impl Desk {
         let folder = tempfile::tempdir().unwrap();
         let mut log = recorded("run.csv", 0);
         change(&mut log);
-        log.write(folder.path().join("run.csv")).unwrap();
+        write_log(&log, folder.path().join("run.csv")).unwrap();
         Self { folder }
     }
 
@@ -206,8 +214,8 @@ fn pasted_lines_give_back_the_log() {
         each(&mut log.tau[0], |tau| -tau);
     });
     let lines = remedies(&desk.findings("serious", None), "columns");
-    let model = Library::built_in().model(Path::new(&desk.model(&lines)));
-    let read = Log::read(desk.path("run.csv"), 1, &model.unwrap().columns).unwrap();
+    let model = read_model(Path::new(&desk.model(&lines)), &Library::built_in());
+    let read = read_rig_log(desk.path("run.csv"), 1, &model.unwrap().columns).unwrap();
     let meant = recorded("run.csv", 0);
     let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
     assert!(near(&read.time, &meant.time) && near(&read.tau[0], &meant.tau[0]));
@@ -237,7 +245,7 @@ fn velocities_come_from_the_angles_where_a_log_has_none() {
         .collect();
     fs::write(&path, text).unwrap();
     assert!(desk.findings("serious", None).is_empty());
-    let read = Log::read_standard(&path).unwrap();
+    let read = read_standard_log(&path).unwrap();
     let exact = recorded("run.csv", 0);
     let off = read.qd[0]
         .iter()
@@ -518,7 +526,7 @@ mod slow {
             for entry in fs::read_dir(folder).unwrap() {
                 let path = entry.unwrap().path();
                 if path.extension().is_some_and(|extension| extension == "csv") {
-                    let log = Log::read_standard(&path).unwrap();
+                    let log = read_standard_log(&path).unwrap();
                     called.extend(is_called_misread(&log, &Columns::default()));
                 }
             }

@@ -2,9 +2,9 @@
 
 use std::fs;
 
-use residyn::expr::SignForm;
-use residyn::model::Dynamics;
-use residyn::model::chain::{Chain, model_text};
+use residyn_core::expr::SignForm;
+use residyn_core::model::Dynamics;
+use residyn_core::model::chain::{Chain, model_text};
 
 use crate::support::catalogue::{dynamics, points};
 use crate::support::mechanisms::{comparable, fixture, format_of, mujoco_agrees, read, system};

@@ -3,12 +3,12 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use residyn::data::{Log, Quantity};
-use residyn::expr::SignForm;
-use residyn::identify::{Shooting, cut, fit, uncertainty};
-use residyn::lanes::Row;
-use residyn::model::{Dynamics, FittedEffect, Library};
-use residyn::sim::{Commands, Hold, Sensors, StepTorque, with_own_angles};
+use residyn_core::data::{Log, Quantity};
+use residyn_core::expr::SignForm;
+use residyn_core::identify::{Shooting, cut, fit, uncertainty};
+use residyn_core::lanes::Row;
+use residyn_core::model::{Dynamics, FittedEffect, Library};
+use residyn_core::sim::{Commands, Hold, Sensors, StepTorque, with_own_angles};
 
 use serde_json::Value;
 
@@ -243,7 +243,7 @@ fn refused(from: &str, to: &str) -> String {
     let delay = include_str!("../models/effects/actuator_delay.toml");
     assert!(delay.contains(from));
     let file = std::path::Path::new("own.toml");
-    residyn::model::Effect::from_text(file, &delay.replace(from, to))
+    residyn_core::model::Effect::from_text(file, &delay.replace(from, to))
         .unwrap_err()
         .to_string()
 }

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
-use residyn::data::{Interval, Log};
-use residyn::expr::SignForm;
-use residyn::identify::calibrate;
-use residyn::model::{Dynamics, Library};
-use residyn::sim::metric::{Assessment, Summary, assess, summarise};
+use residyn_core::data::{Interval, Log};
+use residyn_core::expr::SignForm;
+use residyn_core::identify::calibrate;
+use residyn_core::model::{Dynamics, Library};
+use residyn_core::sim::metric::{Assessment, Summary, assess, summarise};
 
 use crate::support::catalogue::{dynamics, fitted, rng, system};
 use crate::support::logs::{empty_log, simulate};

@@ -1,6 +1,6 @@
 //! One model of each kind that can be exported: equations, effects, filters of the command, networks; one joint and two.
 
-use residyn::formats::ExportModel;
+use residyn_formats::ExportModel;
 
 use crate::support::catalogue::rng;
 use crate::support::exported_models::all;

@@ -1,6 +1,6 @@
 //! The built-in systems against equations written by hand.
 
-use residyn::expr::SignForm;
+use residyn_core::expr::SignForm;
 
 use crate::support::catalogue::{assert_near, dynamics, points, system};
 use crate::support::oracles::{COMMANDED, ORACLES};
@@ -29,5 +29,5 @@ fn every_system_has_an_oracle() {
     let all = ORACLES.into_iter().chain(COMMANDED);
     let mut known: Vec<&str> = all.map(|(name, _)| name).collect();
     known.sort_unstable();
-    assert_eq!(residyn::model::Library::system_names(), known);
+    assert_eq!(residyn_core::model::Library::system_names(), known);
 }

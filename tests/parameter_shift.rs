@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use residyn::expr::SignForm;
-use residyn::model::{Library, Model};
+use residyn::read_model;
+use residyn_core::expr::SignForm;
+use residyn_core::model::{Library, Model};
 use serde_json::Value;
 
 use crate::support::catalogue::{assert_near, dynamics, points};
@@ -135,7 +136,7 @@ mod slow {
         );
         assert!(high - low < 0.01, "{parameter}");
         // The written model has it in its place, and predicts the same, as does the checkpoint's.
-        let written = Model::read(&out.join("model.toml"), Library::built_in().effects()).unwrap();
+        let written = read_model(out.join("model.toml"), &Library::built_in()).unwrap();
         assert!(written.effects.is_empty());
         assert_eq!(written.parameters[0].value, number(&parameter["value"]));
         let error = |model: &[&str]| {

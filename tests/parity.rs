@@ -1,8 +1,8 @@
 //! One function, whoever reads the program: f64, f32, many lanes, Burn's tensors.
 
 use burn::tensor::{Device, Tensor};
-use residyn::expr::{Program, SignForm};
-use residyn::lanes::Row;
+use residyn_core::expr::{Program, SignForm};
+use residyn_core::lanes::Row;
 
 use crate::support::catalogue::{assert_near, catalog, column, in_f32, points};
 use crate::support::tensors::{devices, numbers, tensor};
@@ -103,7 +103,7 @@ fn check_shared(
 
 /// `[row][output]`; outputs that all rows share are repeated.
 fn replay(program: &Program, inputs: &[Tensor<1>]) -> Vec<Vec<f64>> {
-    let outputs: Vec<Vec<f64>> = residyn::train::replay(program, inputs)
+    let outputs: Vec<Vec<f64>> = residyn_train::replay(program, inputs)
         .into_iter()
         .map(numbers)
         .collect();

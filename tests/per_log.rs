@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use rand::SeedableRng;
-use residyn::data::{Joint, Log};
-use residyn::model::Library;
-use residyn::plant::Plant;
+use residyn_core::data::{Joint, Log};
+use residyn_core::model::Library;
+use residyn_io::plant_from_text;
 use serde_json::Value;
 
 use crate::support::{succeeds, text};
@@ -126,7 +126,7 @@ fn a_zero_that_all_logs_share_is_a_tilt() {
 fn a_simulated_rig_starts_at_its_true_angle() {
     let library = Library::built_in();
     let rig = RIG.replace("[1.6]", "[0.0]").replace("1e-3", "0.0");
-    let mut plant = Plant::from_text(Path::new("rig.toml"), &rig, &library).unwrap();
+    let mut plant = plant_from_text(Path::new("rig.toml"), &rig, &library).unwrap();
     let offset = [("q_z".to_owned(), 0.03)];
     plant
         .add_effect(&library, "sensor_offset", Joint::at(0), &offset)

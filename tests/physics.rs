@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use residyn::expr::{Program, SignForm};
-use residyn::lanes::Row;
-use residyn::model::{Dynamics, Model};
-use residyn::sim::{RK4, SCHEMES, Scheme, Stepper};
+use residyn_core::expr::{Program, SignForm};
+use residyn_core::lanes::Row;
+use residyn_core::model::{Dynamics, Model};
+use residyn_core::sim::{RK4, SCHEMES, Scheme, Stepper};
 
 use crate::support::catalogue::{all_systems, dynamics, points, system};
 

@@ -2,13 +2,15 @@
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
-use residyn::closeloop::{Outcome, Request, Settings, Space, Split, Verdict, close_loop};
-use residyn::data::{Log, Smooth};
-use residyn::formats::{ExportModel, find};
-use residyn::model::{FittedEffect, Library, Model, Origin};
-use residyn::report::{self, Report};
-use residyn::sim::Integrator;
-use residyn::sim::metric::torque_error;
+use residyn::read_log;
+use residyn_core::closeloop::{Outcome, Request, Settings, Space, Split, Verdict, close_loop};
+use residyn_core::data::{Log, Smooth};
+use residyn_core::model::{FittedEffect, Library, Model, Origin};
+use residyn_core::sim::Integrator;
+use residyn_core::sim::metric::torque_error;
+use residyn_formats::{ExportModel, find};
+use residyn_report as report;
+use residyn_report::Report;
 use serde_json::{Value, json};
 
 use crate::support::arms::{described, model, moved};
@@ -119,7 +121,7 @@ fn part(log: &Log, start_s: f64, end_s: f64) -> Log {
 fn of_measured(arm: &str, logs: [&str; 2], share: f64, most_percent: f64) -> Option<Outcome> {
     let data = measured(arm)?;
     let declared = described(&read_to(&data.join(format!("{arm}.urdf")), None));
-    let [train, test] = logs.map(|name| declared.read_log(data.join(name)).unwrap());
+    let [train, test] = logs.map(|name| read_log(data.join(name), &declared).unwrap());
     let split_s = train.time[((train.rows() - 1) as f64 * share) as usize];
     let (train, test) = match share < 1.0 {
         true => (
@@ -152,7 +154,7 @@ fn mujoco_follows(model: &Model, arm: &str, log: &str) {
     let is_carried = |e: &&FittedEffect| CARRIED.contains(&e.effect.name.as_str());
     let carried: Vec<FittedEffect> = model.effects.iter().filter(is_carried).cloned().collect();
     let model = model.with_effects(carried);
-    let log = model.read_log(measured(arm).unwrap().join(log)).unwrap();
+    let log = read_log(measured(arm).unwrap().join(log), &model).unwrap();
     let error = torque_error(&model, std::slice::from_ref(&log)).unwrap();
     let Smooth {
         q, qd, qdd, tau, ..

@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use residyn::data::{Joint, Quantity};
-use residyn::expr::{Graph, Node, Program, Scope, SignForm, parse};
-use residyn::model::{Dynamics, Library};
+use residyn_core::data::{Joint, Quantity};
+use residyn_core::expr::{Graph, Node, Program, Scope, SignForm, parse};
+use residyn_core::model::{Dynamics, Library};
 
 use crate::support::catalogue::{
     all_systems, assert_near, can_act, catalog, fitted, jacobian, points,

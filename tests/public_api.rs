@@ -1,11 +1,14 @@
-//! The library's interface beside the list that is committed: what users call changes when that is meant, and not by chance.
+//! The crates' interfaces beside the lists that are committed: what users call changes when that is meant, and not by chance.
 
 use crate::support::committed::is_as_committed;
 use crate::support::interface::interface;
-use crate::support::paths::ours;
+use crate::support::paths::{crates, ours};
 
 #[test]
-fn the_interface_is_the_one_that_is_listed() {
-    let found = interface(&ours("src/lib.rs"));
-    is_as_committed(&ours("tests/public_api.txt"), &found, |a, b| a == b);
+fn the_interfaces_are_those_that_are_listed() {
+    for (name, folder) in crates() {
+        let found = interface(&folder.join("src/lib.rs"));
+        let listed = ours("tests/public_api").join(format!("{name}.txt"));
+        is_as_committed(&listed, &found, |a, b| a == b);
+    }
 }

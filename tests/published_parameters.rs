@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use residyn::expr::SignForm;
-use residyn::model::Library;
+use residyn::read_model;
+use residyn_core::expr::SignForm;
+use residyn_core::model::Library;
 
 use crate::support::catalogue::{assert_near, dynamics};
 
@@ -63,7 +64,7 @@ fn published_parameter_sets_have_the_published_accelerations() {
     let rigs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/rigs");
     for (name, points) in CASES {
         let file = rigs.join(name).with_extension("toml");
-        let system = Library::built_in().model(&file).unwrap();
+        let system = read_model(&file, &Library::built_in()).unwrap();
         assert_eq!(system.name, name);
         let model = dynamics(&system, &[], SignForm::Exact);
         for (state, wanted) in points {

@@ -1,9 +1,10 @@
 //! The recipes that are shipped, and what is said of bad ones.
 
-use residyn::model::Library;
-use residyn::plant::Plant;
-use residyn::train::recipe::{Job, Recipe};
-use residyn::train::{Backend, Checkpoint};
+use residyn::read_model;
+use residyn::read_plant;
+use residyn_core::model::Library;
+use residyn_train::recipe::{Job, Recipe};
+use residyn_train::{Backend, Checkpoint};
 
 use crate::support::in_folder::{json, refused};
 use crate::support::paths::configs;
@@ -18,7 +19,7 @@ fn every_shipped_recipe_and_plant_can_be_read() {
         for path in entries.map(|entry| entry.unwrap().path()) {
             let name = path.file_name().unwrap().to_str().unwrap().to_owned();
             if folder == "plants" || name == "demo.toml" {
-                Plant::read(&path, &library).unwrap();
+                read_plant(&path, &library).unwrap();
             } else if name.starts_with("train-") {
                 let recipe = Recipe::read(&path).unwrap();
                 Job::train(recipe, &library, Backend::NdArray, 0)
@@ -119,7 +120,7 @@ fn a_model_is_trained_and_tuned_with_its_own_smoothing_of_friction() {
                   step_s = 0.02\nposition = [[-1, 1]]\nvelocity = [[-1, 1]]\ntorque = [[-1, 1]]\n[fit]\nepochs = 1\n";
     std::fs::write(dir.join("recipe.toml"), recipe).unwrap();
     let library = Library::built_in();
-    let model = library.model(dir.join("model.toml")).unwrap();
+    let model = read_model(dir.join("model.toml"), &library).unwrap();
     assert_eq!(model.sign_widths(), [0.3]);
     let wanted = model.dynamics().program;
     let has_program = |job: Job| job.model.to_dynamics().unwrap().program == wanted;

@@ -4,10 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use residyn::experiment::{Config, Session};
-use residyn::model::Library;
-use residyn::train::Backend;
-use residyn::train::recipe::{Job, Recipe};
+use residyn_core::model::Library;
+use residyn_experiments::experiment::{Config, Session};
+use residyn_train::Backend;
+use residyn_train::recipe::{Job, Recipe};
 
 use crate::support::text;
 

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use residyn::report::{Report, Words, summary};
+use residyn_report::{Report, Words, summary};
 use serde_json::{Value, json};
 
 use crate::support::paths::ours;

@@ -59,4 +59,5 @@ mod train;
 mod undeclared_effect;
 mod unexplained;
 mod verbosity;
+mod walls;
 mod write_back;

@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
-use residyn::model::Library;
-use residyn::runs::RunFolder;
-use residyn::train::recipe::{Job, Recipe, TrainingResults};
-use residyn::train::{Backend, Penalty};
+use residyn_core::model::Library;
+use residyn_io::runs::RunFolder;
+use residyn_train::recipe::{Job, Recipe, TrainingResults};
+use residyn_train::{Backend, Penalty};
 use serde_json::Value;
 
 use crate::support::in_folder::{json, kill_after, refused, residyn, run};
@@ -19,7 +19,7 @@ fn train(recipe: Recipe, backend: Backend) -> TrainingResults {
     let dir = tempfile::tempdir().unwrap();
     let folder = RunFolder::open(dir.path()).unwrap();
     let mut training = job.begin(&folder).unwrap();
-    let mut observer = |_: &residyn::train::Progress| ControlFlow::Continue(());
+    let mut observer = |_: &residyn_train::Progress| ControlFlow::Continue(());
     training
         .run(&job.data.training, None, &mut observer)
         .unwrap();
@@ -32,7 +32,7 @@ fn recipe(name: &str) -> Recipe {
 
 /// How far the worst parameter is from the truth, as a share of it.
 fn worst(outcome: &TrainingResults) -> f64 {
-    let off = |p: &residyn::train::recipe::FittedParameter| {
+    let off = |p: &residyn_train::recipe::FittedParameter| {
         let truth = p.truth.unwrap();
         ((p.found - truth) / truth).abs()
     };

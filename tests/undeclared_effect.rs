@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use residyn::experiment::undeclared_effect::{Experiment, PlanningModel, Session};
-use residyn::model::Library;
-use residyn::runs::RunFolder;
-use residyn::train::Backend;
+use residyn_core::model::Library;
+use residyn_experiments::experiment::undeclared_effect::{Experiment, PlanningModel, Session};
+use residyn_io::runs::RunFolder;
+use residyn_train::Backend;
 
 use crate::support::paths::configs;
 

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use residyn::closeloop::{
+use residyn::with_effects_in;
+use residyn_core::closeloop::{
     Declared, Problem, Proposal, Settings, Unexplained, proposal, unexplained,
 };
-use residyn::data::{Joint, Log};
-use residyn::model::{FittedEffect, Library, Model};
-use residyn::plant::Plant;
+use residyn_core::data::{Joint, Log};
+use residyn_core::model::{FittedEffect, Library, Model};
+use residyn_io::plant_from_text;
 
 use crate::support::catalogue::rng;
 
@@ -37,14 +38,14 @@ fn library(files: &[String]) -> Library {
     for (number, file) in files.iter().enumerate() {
         std::fs::write(folder.path().join(format!("{number}.toml")), file).unwrap();
     }
-    Library::built_in().with_folder(folder.path()).unwrap()
+    with_effects_in(folder.path(), Library::built_in()).unwrap()
 }
 
 /// Logs of the rig with the hidden force.
 fn logs(sensor: &str, force: &str, seed: u64) -> Vec<Log> {
     let library = library(&[effect("hidden", force)]);
     let text = format!("{RIG}sensor = {{ rate_hz = 100, {sensor} }}\n");
-    let mut plant = Plant::from_text(Path::new("rig.toml"), &text, &library).unwrap();
+    let mut plant = plant_from_text(Path::new("rig.toml"), &text, &library).unwrap();
     plant
         .add_effect(&library, "hidden", Joint::at(0), &[])
         .unwrap();
@@ -57,7 +58,7 @@ fn logs(sensor: &str, force: &str, seed: u64) -> Vec<Log> {
 /// The pendulum with these effects declared, their sizes unknown.
 fn declared(effects: &[&str]) -> Model {
     let library = Library::built_in();
-    let mut system = library.model(Path::new("pendulum")).unwrap();
+    let mut system = library.model("pendulum").unwrap();
     system.parameters[0].value = -17.0;
     system.parameters[1].value = 4.0;
     let absent = |name: &&str| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0));
@@ -154,7 +155,7 @@ fn logs_of_first(model: &str, seed: u64) -> Vec<Log> {
         .replace("[1.6]", "[1.6, 0.0]")
         .replace("[0, 0]", "[0, 0, 0, 0]");
     let text = format!("{text}sensor = {{ rate_hz = 100, {WHITE} }}\n");
-    let plant = Plant::from_text(
+    let plant = plant_from_text(
         &folder.path().join("plant.toml"),
         &text,
         &Library::built_in(),

@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use residyn::Library;
-use residyn::formats::write_back;
-use residyn::model::Model;
-use residyn::model::chain::{Chain, model_text};
+use residyn::read_model;
+use residyn_core::model::Model;
+use residyn_core::model::chain::{Chain, model_text};
+use residyn_formats::write_back;
 
 use crate::support::mechanisms::{comparable, fixture, mujoco_agrees, read_to, system};
 use crate::support::{refuses, residyn, succeeds, text};
@@ -219,7 +220,7 @@ mod slow {
             let n = wanted.joints;
             for point in crate::support::catalogue::points(&wanted, 100, 5) {
                 let moving = &point[..3 * n + 1];
-                let rates = |model: &residyn::model::Dynamics| {
+                let rates = |model: &residyn_core::model::Dynamics| {
                     model.program.eval(&[moving, &model.values()].concat())
                 };
                 let size = rates(&wanted)[n..]
@@ -302,7 +303,7 @@ mod slow {
             "{joint:?}"
         );
         let library = Library::built_in();
-        let fitted = comparable(&library.model(&model).unwrap());
+        let fitted = comparable(&read_model(&model, &library).unwrap());
         let again = comparable(&system(&read_to(&out, None)));
         for (fitted, again) in fitted.values().iter().zip(&again.values()) {
             assert!(

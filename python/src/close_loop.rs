@@ -3,12 +3,13 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
-use residyn::closeloop::{Fits, Progress, Space, Split, Stage, StageTimes, StudyError, Watch};
-use residyn::report::{self, Report};
-use residyn::train::{Backend, ResidualTrainer};
 use residyn::{
     Library, Log as Recorded, Model as Declared, Origin, Reference, Request, Settings, rng,
 };
+use residyn_core::closeloop::{Fits, Progress, Space, Split, Stage, StageTimes, StudyError, Watch};
+use residyn_report as report;
+use residyn_report::Report;
+use residyn_train::{Backend, ResidualTrainer};
 use serde_json::json;
 
 use crate::error::{OrRaise, ResidynError};
@@ -105,6 +106,7 @@ struct Watcher<'l> {
     listener: &'l Listener<Told>,
     /// `None` where the search may take longer than a clock counts.
     deadline: Option<Instant>,
+    start: Instant,
     times: Mutex<StageTimes>,
 }
 
@@ -113,7 +115,7 @@ impl Watch for Watcher<'_> {
         let times = self.times.lock();
         times
             .unwrap_or_else(PoisonError::into_inner)
-            .note(now.stage, Instant::now());
+            .note(now.stage, self.start.elapsed());
         let fits = now.fits.map(|Fits { done, of }| (done, of));
         self.listener
             .tell((now.stage.text(), now.text.to_owned(), fits));
@@ -140,12 +142,13 @@ impl Question {
         let watcher = Watcher {
             listener,
             deadline: start.checked_add(self.budget),
-            times: Mutex::new(StageTimes::since(start)),
+            start,
+            times: Mutex::new(StageTimes::default()),
         };
         let mut outcome = residyn::close_loop(request, &mut rng(self.seed), &watcher)?;
         let times = watcher.times.into_inner();
         let times = times.unwrap_or_else(PoisonError::into_inner);
-        outcome.seconds = times.end(Instant::now());
+        outcome.seconds = times.end(start.elapsed());
         Ok(outcome)
     }
 

@@ -3,12 +3,13 @@ use std::path::PathBuf;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use residyn::Library;
-use residyn::control::{
+use residyn::read_plant;
+use residyn_control::control::{
     Episode as Played, EpisodeError, Predictor, Task, episode, with_controller,
 };
-use residyn::plant::Plant;
-use residyn::runs::{Purpose, stream};
-use residyn::train::{Backend, Checkpoint};
+use residyn_core::plant::Plant;
+use residyn_core::streams::{Purpose, stream};
+use residyn_train::{Backend, Checkpoint};
 
 use crate::error::{OrRaise, ResidynError};
 use crate::log::Log;
@@ -131,7 +132,7 @@ pub fn control(
     episodes: usize,
     seed: u64,
 ) -> PyResult<Vec<Episode>> {
-    let plant = Plant::read(&plant, &Library::built_in()).or_raise_at(&plant)?;
+    let plant = read_plant(&plant, &Library::built_in()).or_raise_at(&plant)?;
     let task = task_of(&plant, task.as_deref())?;
     let predictor = model.predictor(&task)?;
     if predictor.joints() != task.joints() {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use residyn::files::OutputError;
+use residyn_io::files::OutputError;
 
 pyo3::create_exception!(
     residyn,

@@ -72,15 +72,15 @@ mod _residyn {
         let owned = |names: Vec<&str>| names.into_iter().map(str::to_owned).collect();
         Ok(match of {
             "systems" => residyn::Library::system_names(),
-            "plants" => owned(residyn::plant::Plant::names()),
-            "tasks" => owned(residyn::control::Task::names()),
+            "plants" => owned(residyn_core::plant::Plant::names()),
+            "tasks" => owned(residyn_control::control::Task::names()),
             "effects" => (library.effects().iter())
                 .map(|effect| effect.name.clone())
                 .collect(),
             "drives" => (residyn::Library::drives().into_iter())
                 .map(|drive| drive.name)
                 .collect(),
-            "formats" => (residyn::formats::FORMATS.iter())
+            "formats" => (residyn_formats::FORMATS.iter())
                 .map(|format| format.name.to_owned())
                 .collect(),
             _ => {

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use residyn::Library as Known;
+use residyn::{Library as Known, with_effects_in};
 
 use crate::error::OrRaise;
 use crate::model::Model;
@@ -32,7 +32,7 @@ impl Library {
     /// Raises:
     ///     ResidynError: a folder that cannot be read, or a file that is no effect, with line, column and remedy.
     fn with_folder(&self, path: PathBuf) -> PyResult<Self> {
-        let more = self.0.clone().with_folder(&path);
+        let more = with_effects_in(&path, self.0.clone());
         more.or_raise_at(&path).map(Self)
     }
 
@@ -103,8 +103,9 @@ impl Effects<'_> {
         match self {
             Self::Library(library) => Ok(library.0.clone()),
             Self::Folders(folders) => {
-                let with =
-                    |known: Known, folder: PathBuf| known.with_folder(&folder).or_raise_at(&folder);
+                let with = |known: Known, folder: PathBuf| {
+                    with_effects_in(&folder, known).or_raise_at(&folder)
+                };
                 folders.into_iter().try_fold(Known::built_in(), with)
             }
         }

@@ -4,7 +4,9 @@ use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::{PyImportError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use residyn::data::{self, Channels, Interval, Quantity, audit};
+use residyn::{read_standard_log, write_log};
+use residyn_core::data;
+use residyn_core::data::{Channels, Interval, Quantity, audit};
 
 use crate::arrays::{ArrayLike, columns, matrix, plain, vector};
 use crate::error::{OrRaise, ResidynError};
@@ -229,7 +231,7 @@ impl Log {
     ///     ResidynError: a folder that cannot be written.
     #[allow(clippy::needless_pass_by_value)] // what Python gives is made into a path of our own
     fn write(&self, path: PathBuf) -> PyResult<()> {
-        self.0.write(path).or_raise()
+        write_log(&self.0, path).or_raise()
     }
 
     fn __len__(&self) -> usize {
@@ -316,7 +318,7 @@ fn columns_of(frame: &Bound<'_, PyAny>) -> PyResult<Columns> {
 #[pyfunction]
 #[allow(clippy::needless_pass_by_value)]
 pub fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Log> {
-    py.detach(|| residyn::Log::read_standard(&path))
+    py.detach(|| read_standard_log(&path))
         .or_raise_at(&path)
         .map(Log)
 }

@@ -3,10 +3,11 @@ use std::path::{Path, PathBuf};
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use residyn::formats::{self, ExportModel};
-use residyn::sim::metric::{assess, needed_torques, summarise, torque_error, traces};
-use residyn::sim::{Environment, Integrator};
-use residyn::{Library, Log as Recorded};
+use residyn::{Library, Log as Recorded, exported_task, read_log, read_model};
+use residyn_core::sim::metric::{assess, needed_torques, summarise, torque_error, traces};
+use residyn_core::sim::{Environment, Integrator};
+use residyn_formats as formats;
+use residyn_formats::ExportModel;
 use serde_json::json;
 
 use crate::arrays::{ArrayLike, columns, matrix, named, plain, vector};
@@ -52,7 +53,7 @@ impl Parameter {
 impl Model {
     /// A model file, or a built-in system by its name.
     pub fn of_library(library: Library, path: &Path) -> PyResult<Self> {
-        let inner = library.model(path).or_raise_at(path)?;
+        let inner = read_model(path, &library).or_raise_at(path)?;
         Ok(Self { inner, library })
     }
 
@@ -222,7 +223,7 @@ impl Model {
         self.inner
             .effects
             .iter()
-            .map(residyn::model::FittedEffect::label)
+            .map(residyn_core::model::FittedEffect::label)
             .collect()
     }
 
@@ -254,7 +255,7 @@ impl Model {
     /// Raises:
     ///     ResidynError: a folder that cannot be written.
     fn write(&self, path: PathBuf) -> PyResult<()> {
-        residyn::files::write_whole(&path, self.inner.text.as_bytes()).or_raise()
+        residyn_io::files::write_whole(&path, self.inner.text.as_bytes()).or_raise()
     }
 
     /// Read a log of this rig, of any format that is read, by the model's `[columns]`.
@@ -268,7 +269,7 @@ impl Model {
     /// Raises:
     ///     ResidynError: with file, line and column, what is wrong and what to do.
     fn read_log(&self, py: Python<'_>, path: PathBuf) -> PyResult<Log> {
-        py.detach(|| self.inner.read_log(&path))
+        py.detach(|| read_log(&path, &self.inner))
             .or_raise_at(&path)
             .map(Log)
     }
@@ -438,7 +439,8 @@ impl Model {
         let format = formats::find(format).or_raise()?;
         check_seconds("step", step_s)?;
         let origin = json!({"config": {"model": self.inner.name}, "seed": 0});
-        let model = ExportModel::of_system(&self.inner, integrator_of(integrator)?, step_s, origin);
+        let model = ExportModel::of_system(&self.inner, integrator_of(integrator)?, step_s, origin)
+            .with_task(exported_task(&self.inner.name));
         py.detach(|| format.write(&model, &path)).or_raise()?;
         Ok((format.not_carried)(&model))
     }

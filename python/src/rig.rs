@@ -3,12 +3,14 @@ use std::path::{Path, PathBuf};
 
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
-use residyn::control::Task;
-use residyn::data::Joint;
-use residyn::model::Dynamics;
-use residyn::plan::Objective;
-use residyn::plant::{self, Plant};
+use residyn::read_plant;
 use residyn::{Library, rng};
+use residyn_control::control::Task;
+use residyn_control::plan::Objective;
+use residyn_core::data::Joint;
+use residyn_core::model::Dynamics;
+use residyn_core::plant;
+use residyn_core::plant::Plant;
 use self_cell::self_cell;
 
 use crate::arrays::{ArrayLike, named, vector};
@@ -50,7 +52,7 @@ impl Rig {
     #[new]
     #[pyo3(signature = (plant, task=None))]
     fn new(plant: PathBuf, task: Option<PathBuf>) -> PyResult<Self> {
-        let plant = Plant::read(&plant, &Library::built_in()).or_raise_at(&plant)?;
+        let plant = read_plant(&plant, &Library::built_in()).or_raise_at(&plant)?;
         let task = task_of(&plant, task.as_deref())?;
         Ok(Self {
             objective: task.objective(),
@@ -183,7 +185,7 @@ pub fn simulate(
     library: Option<PyRef<'_, library::Library>>,
 ) -> PyResult<Log> {
     let library = library.map_or_else(Library::built_in, |library| library.0.clone());
-    let mut plant = Plant::read(&plant, &library).or_raise_at(&plant)?;
+    let mut plant = read_plant(&plant, &library).or_raise_at(&plant)?;
     for (at, values) in effects {
         let (effect, joint) = place(&at)?;
         let first = library.effect(effect).or_raise()?;

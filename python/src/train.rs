@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use residyn::Library;
-use residyn::runs::RunFolder;
-use residyn::train::recipe::{Job, Recipe, RecipeError, Saves, TrainingResults};
-use residyn::train::{Backend, Checkpoint, Progress, save};
+use residyn_io::runs::RunFolder;
+use residyn_train::recipe::{Job, Recipe, RecipeError, Saves, TrainingResults};
+use residyn_train::{Backend, Checkpoint, Progress, save};
 
 use crate::arrays::plain;
 use crate::error::{OrRaise, ResidynError};

@@ -4,8 +4,10 @@ use anyhow::Result;
 use clap::Args;
 
 use super::{Answer, Common, inputs, remedy, voice};
-use crate::data::{Audit, Columns, Log, Severity, audit_together, tell_repeats};
-use crate::model::Library;
+use residyn_core::data::{Audit, Columns, Log, Severity, audit_together, tell_repeats};
+use residyn_core::model::Library;
+use residyn_io::read_model;
+use residyn_io::read_standard_log;
 
 /// Audit logs: units, signs, sampling, noise, jumps, lags, excitation, what they cannot show, and what mends them
 #[derive(Debug, Args)]
@@ -55,9 +57,9 @@ fn headline(audit: &Audit) -> String {
 /// The logs and what their columns are.
 fn read(arguments: &Arguments) -> Result<(Vec<Log>, Columns)> {
     let Some(model) = &arguments.model else {
-        let logs = arguments.logs.iter().map(Log::read_standard);
+        let logs = arguments.logs.iter().map(read_standard_log);
         return Ok((logs.collect::<Result<_, _>>()?, Columns::default()));
     };
-    let model = Library::built_in().model(model)?;
+    let model = read_model(model, &Library::built_in())?;
     Ok((inputs::logs(&arguments.logs, &model)?, model.columns))
 }

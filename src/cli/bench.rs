@@ -11,11 +11,11 @@ use serde_json::json;
 use super::call::{Begun, files};
 use super::shard::{self, Sharding, program_id};
 use super::{Answer, Common, interrupt, progress, told, voice};
-use crate::bench::{Cell, Line, Source, markdown, read, recorded, summarise};
-use crate::files::content_id;
-use crate::model::Library;
-use crate::report::ResultsPage;
-use crate::runs::{Identity, Lines, RunFolder};
+use residyn_core::model::Library;
+use residyn_io::files::content_id;
+use residyn_io::runs::{Identity, Lines, RunFolder};
+use residyn_report::ResultsPage;
+use residyn_validation::{Cell, Line, Source, markdown, read, recorded, summarise};
 
 /// Measure the program on simulated and on measured rigs
 #[derive(Debug, Args)]

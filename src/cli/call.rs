@@ -6,7 +6,8 @@ use std::time::{Instant, SystemTime};
 use anyhow::{Context, Result};
 
 use super::command_line;
-use crate::runs::{Call, InputFile};
+use residyn_core::model::{Call, InputFile};
+use residyn_io::files::sha256_of;
 
 /// When a command began.
 pub(super) struct Begun {
@@ -36,7 +37,13 @@ impl Begun {
 /// Files read in one role. Names of what is built in are not among them.
 pub(super) fn files(role: &str, paths: &[PathBuf]) -> Result<Vec<InputFile>> {
     let read = |path: &Path| {
-        InputFile::read(role, path).with_context(|| format!("{}: cannot be read", path.display()))
+        let name = path.display();
+        let sha256 = sha256_of(path).with_context(|| format!("{name}: cannot be read"))?;
+        Ok(InputFile {
+            role: role.to_owned(),
+            path: name.to_string(),
+            sha256,
+        })
     };
     let there = paths.iter().filter(|path| path.is_file());
     there.map(|path| read(path)).collect()

@@ -1,3 +1,4 @@
+use residyn_io::read_model;
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -23,9 +24,12 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
-    let models = arguments.models.iter().map(|path| library.model(path));
+    let models = arguments
+        .models
+        .iter()
+        .map(|path| read_model(path, &library));
     let models = models.collect::<Result<Vec<_>, _>>()?;
-    let mut rng = crate::rng(arguments.common.seed);
+    let mut rng = residyn_core::rng(arguments.common.seed);
     let checks: Vec<_> = models.iter().map(|model| model.check(&mut rng)).collect();
     let named = || arguments.models.iter().zip(&checks);
     if arguments.common.json {

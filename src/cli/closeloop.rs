@@ -13,15 +13,16 @@ use rand_chacha::ChaCha8Rng;
 
 use super::call::{Begun, files};
 use super::{Answer, Common, inputs, interrupt, progress, remedy, voice};
-use crate::closeloop::{
+use residyn_core::closeloop::{
     Calibrator, Outcome, Reference, Request, Settings, Space, Split, Verdict, prepare, solve,
 };
-use crate::data::{LeaveOut, Log};
-use crate::model::{Library, Model, Origin};
-use crate::plant::Plant;
-use crate::report;
-use crate::runs::{InputFile, RunFolder};
-use crate::train::ResidualTrainer;
+use residyn_core::data::{LeaveOut, Log};
+use residyn_core::model::InputFile;
+use residyn_core::model::{Library, Model, Origin};
+use residyn_io::runs::RunFolder;
+use residyn_io::{plant_from_text, read_model};
+use residyn_report as report;
+use residyn_train::ResidualTrainer;
 
 /// Find what a model lacks: fit it, trace the residual to effects, add them, refit, report before and after
 ///
@@ -170,7 +171,7 @@ fn kept(out: &Path, written: &Arc<AtomicBool>) -> impl Fn() -> String + Send + '
 }
 
 fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(Model, Split)> {
-    let declared = library.model(model)?;
+    let declared = read_model(model, library)?;
     inputs::print_findings(model, &declared, arguments.common.seed);
     if declared.free_parameters() > MANY_PARAMETERS {
         voice::say(format!(
@@ -201,7 +202,7 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(M
 }
 
 fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(Model, Split)> {
-    let plant = Plant::from_text(Path::new("configs/demo.toml"), DEMO, library)?;
+    let plant = plant_from_text(Path::new("configs/demo.toml"), DEMO, library)?;
     let record = |k: usize| -> Result<Log> {
         let mut log = plant.record(rng)?;
         log.path = format!("demo{}.csv", k + 1).into();
@@ -220,7 +221,7 @@ fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(Model, Split)> {
 /// Models that predict the same joints, in the same units.
 fn references(paths: &[PathBuf], declared: &Model, library: &Library) -> Result<Vec<Reference>> {
     let reference = |path: &PathBuf| {
-        let other = library.model(path)?;
+        let other = read_model(path, library)?;
         if other.prismatic != declared.prismatic {
             bail!(
                 "--against {}: it has {}, {} has {}; give models of the same rig",

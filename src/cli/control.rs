@@ -9,15 +9,20 @@ use serde::Serialize;
 
 use super::inputs::{self, Source};
 use super::{Answer, Common, progress, voice};
-use crate::control::{Controller, Episode, Policy, Predictor, Task, episode, with_controller};
-use crate::data::statistics::{mean, sample_deviation};
-use crate::files::write_whole;
-use crate::model::Library;
-use crate::plan::Method;
-use crate::plant::{Noise, Plant};
-use crate::report::film;
-use crate::runs::{Purpose, RunFolder, stream};
-use crate::train::Checkpoint;
+use residyn_control::control::{
+    Controller, Episode, Policy, Predictor, Task, episode, with_controller,
+};
+use residyn_control::plan::Method;
+use residyn_core::data::statistics::{mean, sample_deviation};
+use residyn_core::model::Library;
+use residyn_core::plant::{Noise, Plant};
+use residyn_core::streams::{Purpose, stream};
+use residyn_io::files::write_whole;
+use residyn_io::read_model;
+use residyn_io::runs::RunFolder;
+use residyn_io::{read_plant, write_log};
+use residyn_report::{Film, film};
+use residyn_train::Checkpoint;
 
 /// Control a simulated plant by model-predictive control with any model
 #[derive(Debug, Args)]
@@ -98,7 +103,7 @@ struct Entry {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
-    let plant = Plant::read(&arguments.plant, &library)?;
+    let plant = read_plant(&arguments.plant, &library)?;
     let task = task(arguments, &plant)?;
     let predictor = predictor(arguments, &library, &task)?;
     if predictor.joints() != task.joints() {
@@ -204,7 +209,7 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
             Ok(model.predictor(integrator))
         }
         Source::File(file) => {
-            let dynamics = library.model(file)?.dynamics();
+            let dynamics = read_model(file, library)?.dynamics();
             Ok(Predictor::of_equations(dynamics, task.integrator))
         }
     }
@@ -260,16 +265,23 @@ fn written(
     };
     let name = |ending: &str| out.join(format!("episode-{number:03}.{ending}"));
     let log = name("csv");
-    episode.stretch.log.write(&log)?;
+    write_log(&episode.stretch.log, &log)?;
     let title = format!(
         "{} on {}: return {:.1}",
         task.name(),
         arguments.plant.display(),
         episode.total()
     );
-    let Some(picture) = film(task, episode, &title)? else {
+    if task.figure.is_empty() {
         return Ok((Some(log), None));
-    };
+    }
+    let picture = film(Film {
+        title,
+        step_s: task.step_s,
+        figure: task.figure_of(episode),
+        torques: &episode.stretch.log.tau,
+        rewards: &episode.rewards,
+    })?;
     let film = name("svg");
     write_whole(&film, picture.as_bytes())?;
     Ok((Some(log), Some(film)))

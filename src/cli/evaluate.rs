@@ -8,11 +8,14 @@ use serde::Serialize;
 use super::inputs::{self, Source};
 use super::status::NotFinite;
 use super::{Answer, Common, voice};
-use crate::data::{Joint, LeaveOut, Log, audit_together};
-use crate::identify::calibrate;
-use crate::model::{Dynamics, Model};
-use crate::sim::metric::{Summary, TorqueError, assess, summarise, torque_error, torques_leave};
-use crate::train::Checkpoint;
+use residyn_core::data::{Joint, LeaveOut, Log, audit_together};
+use residyn_core::identify::calibrate;
+use residyn_core::model::{Dynamics, Model};
+use residyn_core::sim::metric::{
+    Summary, TorqueError, assess, summarise, torque_error, torques_leave,
+};
+use residyn_io::read_model;
+use residyn_train::Checkpoint;
 
 /// Open-loop prediction error of a model or a checkpoint on logs
 #[derive(Debug, Args)]
@@ -137,7 +140,7 @@ fn model(arguments: &Arguments) -> Result<(Model, Dynamics)> {
     let library = arguments.effects.library()?;
     match arguments.model.source() {
         Source::File(file) => {
-            let declared = library.model(file)?;
+            let declared = read_model(file, &library)?;
             let dynamics = declared.dynamics();
             Ok((declared, dynamics))
         }

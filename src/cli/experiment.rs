@@ -8,11 +8,11 @@ use serde_json::Value;
 use super::call::{Begun, files};
 use super::shard::{self, Sharding};
 use super::{Answer, Common, command_line, inputs, interrupt, progress, voice};
-use crate::experiment::undeclared_effect::{self, Trial};
-use crate::experiment::{Config, Experiment, FinishedRound, Session, picture};
-use crate::model::Library;
-use crate::report::{ResultsPage, Share};
-use crate::runs::{Part, RunFolder, Shard};
+use residyn_core::model::Library;
+use residyn_experiments::experiment::undeclared_effect::{self, Trial};
+use residyn_experiments::experiment::{Config, Experiment, FinishedRound, Session, picture};
+use residyn_io::runs::{Part, RunFolder, Shard};
+use residyn_report::{ResultsPage, Share};
 
 /// Experiments: return against real transitions, against the receding horizon, and with undeclared effects
 ///

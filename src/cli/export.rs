@@ -9,14 +9,16 @@ use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
 use super::{Answer, Common, voice};
-use crate::files::{OutputError, folder_of, write_whole};
-use crate::formats::{
+use crate::exported_task;
+use residyn_core::limits::SUBSTEPS;
+use residyn_core::model::Library;
+use residyn_core::sim::Integrator;
+use residyn_formats::{
     ClientError, Difference, ExportModel, File, Format, WrittenBack, find, rollout_s, write_back,
 };
-use crate::limits::SUBSTEPS;
-use crate::model::Library;
-use crate::sim::Integrator;
-use crate::train::{Checkpoint, Manifest};
+use residyn_io::files::{OutputError, folder_of, write_whole};
+use residyn_io::read_model;
+use residyn_train::{Checkpoint, Manifest};
 
 /// Write a model for other programs, and compare their predictions with its own
 #[derive(Debug, Args)]
@@ -65,6 +67,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 
 fn write(arguments: &Arguments, format: &'static Format) -> Result<Answer> {
     let model = portable(arguments)?;
+    let task = exported_task(model.name());
+    let model = model.with_task(task);
     let not_carried = (format.not_carried)(&model);
     if let Some(told) = told_of_steps(&model, arguments)? {
         voice::say(told);
@@ -112,7 +116,7 @@ fn write_into(arguments: &Arguments, file: &Path) -> Result<Answer> {
     let Source::File(model) = arguments.model.source() else {
         unreachable!("clap refuses a checkpoint beside --into");
     };
-    let model = arguments.effects.library()?.model(model)?;
+    let model = read_model(model, &arguments.effects.library()?)?;
     let WrittenBack { text, not_carried } = write_back(&model, file, arguments.tip.as_deref())?;
     prepare(arguments, &not_carried)?;
     write_whole(&arguments.out, text.as_bytes())?;
@@ -142,7 +146,7 @@ fn measure(
     arguments: &Arguments,
 ) -> Result<Difference, ClientError> {
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
-    let refused = |error: crate::model::NetworkError| ClientError::Failed(error.to_string());
+    let refused = |error: residyn_core::model::NetworkError| ClientError::Failed(error.to_string());
     let samples = model.samples(&mut rng).map_err(refused)?;
     let own = model.predict(&samples).map_err(refused)?;
     own.check_finite(&samples)?;
@@ -194,7 +198,7 @@ fn step_of(config: &Value) -> Option<f64> {
 }
 
 fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<ExportModel> {
-    let model = library.model(file)?;
+    let model = read_model(file, library)?;
     Ok(ExportModel::of_system(
         &model,
         arguments.integrator.unwrap_or(Integrator::RK4),

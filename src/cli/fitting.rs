@@ -10,9 +10,9 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
 use super::{Answer, Common, interrupt, progress, voice};
-use crate::runs::RunFolder;
-use crate::train::recipe::{Change, Job, Saves};
-use crate::train::{Progress, Training, save};
+use residyn_io::runs::RunFolder;
+use residyn_train::recipe::{Change, Job, Saves};
+use residyn_train::{Progress, Training, save};
 
 /// Where and how often to save.
 #[derive(Debug, Args)]

@@ -5,9 +5,9 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Answer, Common, inputs, voice};
-use crate::formats::Imported;
-use crate::runs::RunFolder;
-use crate::train::save_imported;
+use crate::save_imported;
+use residyn_formats::Imported;
+use residyn_io::runs::RunFolder;
 
 /// Make a checkpoint from a model that was exported as JSON and safetensors
 #[derive(Debug, Args)]

@@ -7,10 +7,13 @@ use anyhow::Result;
 use clap::Args;
 
 use super::{remedy, voice};
-use crate::data::{Audit, LeaveOut, Log, leave_out};
-use crate::limits::RUNS;
-use crate::model::check::Severity;
-use crate::model::{Library, Model, effect_files};
+use residyn_core::data::{Audit, LeaveOut, Log, leave_out};
+use residyn_core::limits::RUNS;
+use residyn_core::model::check::Severity;
+use residyn_core::model::{Library, Model};
+use residyn_io::effect_files;
+use residyn_io::read_logs;
+use residyn_io::with_effects_in;
 
 /// The effects that model files may name: the built-in ones and the user's own.
 #[derive(Debug, Args)]
@@ -24,7 +27,7 @@ impl Effects {
     pub fn library(&self) -> Result<Library> {
         let mut library = Library::built_in();
         for folder in &self.folders {
-            library = library.with_folder(folder)?;
+            library = with_effects_in(folder, library)?;
         }
         Ok(library)
     }
@@ -75,7 +78,7 @@ impl ModelArguments {
 
 /// Read logs for a system and leave out the given intervals; notes go to standard error.
 pub(super) fn logs(paths: &[PathBuf], model: &Model) -> Result<Vec<Log>> {
-    Ok(model.read_logs(paths)?)
+    Ok(read_logs(paths, model)?)
 }
 
 /// Apply `--leave-out` to two sets of logs at once: an entry may name a log of either.
@@ -94,7 +97,7 @@ pub(super) fn leave_out(
 
 /// Print on standard error what in a model cannot be meant, before anything is computed with it.
 pub(super) fn print_findings(path: &Path, model: &Model, seed: u64) {
-    for finding in model.check(&mut crate::rng(seed)).findings {
+    for finding in model.check(&mut residyn_core::rng(seed)).findings {
         let label = match finding.severity {
             Severity::Error => "serious",
             Severity::Warning => "warning",

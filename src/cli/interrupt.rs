@@ -9,7 +9,7 @@ use std::thread;
 use indicatif::ProgressBar;
 
 use super::{command_line, voice};
-use crate::runs::RunFolder;
+use residyn_io::runs::RunFolder;
 
 /// As shells report a program that Ctrl-C ended.
 const STATUS: i32 = 130;

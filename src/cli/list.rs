@@ -6,10 +6,11 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::{Answer, Common, inputs, voice};
-use crate::control::Task;
-use crate::formats::FORMATS;
-use crate::model::{Effect, Library, Model};
-use crate::plant::Plant;
+use residyn_control::control::Task;
+use residyn_core::model::{Effect, Library, Model};
+use residyn_core::plant::Plant;
+use residyn_formats::FORMATS;
+use residyn_io::read_plant;
 
 /// List systems, effects, drives, plants, tasks or formats
 #[derive(Debug, Args)]
@@ -75,7 +76,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 fn systems(library: &Library) -> Result<(String, serde_json::Value)> {
     let (mut text, mut values) = (String::new(), Vec::new());
     for name in Library::system_names() {
-        let model: Model = library.model(Path::new(&name))?;
+        let model: Model = library.model(&name)?;
         let parameters: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
         let _ = writeln!(
             text,
@@ -101,7 +102,7 @@ fn effects(effects: &[Effect]) -> (String, serde_json::Value) {
             );
         }
         let _ = writeln!(text, "    shown by {}", effect.shown_by);
-        let parameter = |p: &crate::model::EffectParameter| json!({"name": p.name, "unit": p.unit, "about": p.about, "typical": p.typical});
+        let parameter = |p: &residyn_core::model::EffectParameter| json!({"name": p.name, "unit": p.unit, "about": p.about, "typical": p.typical});
         values.push(json!({
             "name": effect.name, "about": effect.about, "formula": formula,
             "parameters": effect.parameters.iter().map(parameter).collect::<Vec<_>>(),
@@ -135,7 +136,7 @@ fn drives() -> (String, serde_json::Value) {
 fn plants(library: &Library) -> Result<(String, serde_json::Value)> {
     let (mut text, mut values) = (String::new(), Vec::new());
     for name in Plant::names() {
-        let plant = Plant::read(Path::new(name), library)?;
+        let plant = read_plant(Path::new(name), library)?;
         let effects: Vec<String> = (plant.effects.iter())
             .map(|e| format!("{} on joint {}", e.effect.name, e.joint))
             .collect();

@@ -8,10 +8,10 @@ use serde_json::json;
 
 use super::experiment::message;
 use super::{Answer, Common, inputs, interrupt, progress, voice};
-use crate::experiment::{Config, FinishedRound, Session};
-use crate::mbrl::Round;
-use crate::report::EventFile;
-use crate::runs::RunFolder;
+use residyn_experiments::experiment::{Config, FinishedRound, Session};
+use residyn_experiments::mbrl::Round;
+use residyn_io::runs::RunFolder;
+use residyn_report::EventFile;
 
 /// Model-based reinforcement learning: train a model, control the plant with it, add the new data, repeat
 ///

@@ -5,7 +5,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Answer, voice};
-use crate::runs::{Lacking, RunFolder, merge};
+use residyn_io::runs::{Lacking, RunFolder, merge};
 
 /// Put the parts of a run together that --shard did apart, on several machines say
 ///

@@ -37,7 +37,7 @@ use std::sync::OnceLock;
 use clap::{Args, Parser, Subcommand};
 
 pub use self::defect::tell_of_panics;
-use crate::train::Backend;
+use residyn_train::Backend;
 
 /// From a rig's log to the physical effect that its model lacks.
 #[derive(Debug, Parser)]

@@ -5,8 +5,8 @@ use clap::{Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, value_parse
 use serde_json::json;
 
 use super::{Answer, Common, voice};
-use crate::files::write_whole;
-use crate::formats::{FORMATS, Format, RobotReader};
+use residyn_formats::{FORMATS, Format, RobotReader};
+use residyn_io::files::write_whole;
 
 /// Write a model file for a serial mechanism, its equations derived from a robot description
 #[derive(Debug, Args)]

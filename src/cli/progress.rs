@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::voice;
-use crate::closeloop::{Fits, Progress, Stage, StageTimes, Watch};
+use residyn_core::closeloop::{Fits, Progress, Stage, StageTimes, Watch};
 
 /// How often a line is written where there is no terminal.
 const EVERY: Duration = Duration::from_secs(10);
@@ -93,6 +93,7 @@ pub(super) struct Stages {
     bar: Bar,
     /// `None` where the search may take longer than a clock counts.
     deadline: Option<Instant>,
+    start: Instant,
     seen: Mutex<Seen>,
 }
 
@@ -108,8 +109,9 @@ impl Stages {
         Self {
             bar: stages(),
             deadline: start.checked_add(budget),
+            start,
             seen: Mutex::new(Seen {
-                times: StageTimes::since(start),
+                times: StageTimes::default(),
                 fits_since: start,
             }),
         }
@@ -126,18 +128,20 @@ impl Stages {
             .seen
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
-        let (last, since) = times.now();
-        self.bar.suspend(|| voice::took(last.text(), since));
+        let (last, begun) = times.now();
+        self.bar
+            .suspend(|| voice::took(last.text(), self.start + begun));
         self.bar.finish_and_clear();
-        times.end(Instant::now())
+        times.end(self.start.elapsed())
     }
 }
 
 impl Watch for Stages {
     fn see(&self, now: Progress<'_>) {
         let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((ended, since)) = seen.times.note(now.stage, Instant::now()) {
-            self.bar.suspend(|| voice::took(ended.text(), since));
+        if let Some((ended, begun)) = seen.times.note(now.stage, self.start.elapsed()) {
+            self.bar
+                .suspend(|| voice::took(ended.text(), self.start + begun));
         }
         self.bar.set_position(now.stage.number() as u64);
         self.bar.set_message(seen.message(now));

@@ -4,17 +4,17 @@ use std::path::Path;
 
 use anyhow::Chain;
 
-use crate::bench::GridError;
-use crate::bench::rigs::RigsError;
-use crate::closeloop::StudyError;
-use crate::control::NoTask;
-use crate::data::Remedy;
-use crate::experiment::ExperimentError;
-use crate::files::OutputError;
-use crate::formats::ExportError;
-use crate::model::{FileError, FileRemedy};
-use crate::runs::{MergeError, RunFolderError};
-use crate::train::recipe::RecipeError;
+use residyn_control::control::NoTask;
+use residyn_core::closeloop::StudyError;
+use residyn_core::data::Remedy;
+use residyn_core::model::{FileError, FileRemedy};
+use residyn_experiments::experiment::ExperimentError;
+use residyn_formats::ExportError;
+use residyn_io::files::OutputError;
+use residyn_io::runs::{MergeError, RunFolderError};
+use residyn_train::recipe::RecipeError;
+use residyn_validation::GridError;
+use residyn_validation::rigs::RigsError;
 
 /// The error number of too many open files, the same on all Unix systems.
 const EMFILE: i32 = 24;

@@ -4,8 +4,8 @@ use anyhow::Result;
 use clap::Args;
 
 use super::{Answer, voice};
-use crate::report::Report;
-use crate::runs::RunFolder;
+use residyn_io::runs::RunFolder;
+use residyn_report::Report;
 
 /// Make report.html and report.md again from report.json
 #[derive(Debug, Args)]

@@ -7,8 +7,8 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Answer, Common, LIBRARY, voice};
-use crate::files::content_id;
-use crate::runs::{Identity, Part, RunFolder, Shard};
+use residyn_io::files::content_id;
+use residyn_io::runs::{Identity, Part, RunFolder, Shard};
 
 /// The share of the work that a command is to do.
 #[derive(Debug, Args)]

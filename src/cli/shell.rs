@@ -5,7 +5,7 @@ use clap::{Args, CommandFactory};
 use clap_complete::{Shell, generate};
 
 use super::{Answer, Cli, voice};
-use crate::files::OutputError;
+use residyn_io::files::OutputError;
 
 /// Completions for a shell, on standard output
 #[derive(Debug, Args)]

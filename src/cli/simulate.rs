@@ -8,10 +8,11 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
 use super::{Answer, Common, inputs, voice};
-use crate::data::Joint;
-use crate::files::check_room;
-use crate::model::Library;
-use crate::plant::Plant;
+use residyn_core::data::Joint;
+use residyn_core::model::Library;
+use residyn_core::plant::Plant;
+use residyn_io::files::check_room;
+use residyn_io::{read_plant, write_log};
 
 /// Write the log of a simulated rig, with chosen effects and sensor noise
 #[derive(Debug, Args)]
@@ -78,7 +79,7 @@ impl FromStr for EffectSetting {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
-    let mut plant = Plant::read(&arguments.plant, &library)?;
+    let mut plant = read_plant(&arguments.plant, &library)?;
     add_effects(&mut plant, &library, &arguments.effect)?;
     if let Some(duration) = arguments.duration {
         let lasting = plant.lasting(duration);
@@ -87,8 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     check_room(&arguments.out)?;
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
     let log = voice::stage("simulating", || plant.record(&mut rng))?;
-    log.write(&arguments.out)
-        .context("the log was not written")?;
+    write_log(&log, &arguments.out).context("the log was not written")?;
     let effects: Vec<&str> = plant
         .effects
         .iter()

@@ -2,10 +2,10 @@
 
 use std::error::Error;
 
-use crate::control::{EpisodeError, LostPlan};
-use crate::identify::FitError;
-use crate::plant::PlantError;
-use crate::train::TrainError;
+use residyn_control::control::{EpisodeError, LostPlan};
+use residyn_core::identify::FitError;
+use residyn_core::plant::PlantError;
+use residyn_train::TrainError;
 
 /// What a command finds beyond the finite numbers.
 #[derive(Debug, thiserror::Error)]

@@ -13,8 +13,8 @@ use serde_json::json;
 use self::store::{Store, Stored};
 use super::shard::{self, Sharding};
 use super::{Answer, Common, command_line, inputs, interrupt, progress, voice};
-use crate::runs::{Identity, RunFolder};
-use crate::train::recipe::{Job, Member, Recipe, SweepResults};
+use residyn_io::runs::{Identity, RunFolder};
+use residyn_train::recipe::{Job, Member, Recipe, SweepResults};
 
 /// Train many models by one recipe, with different initial weights or different weights of the penalty
 ///

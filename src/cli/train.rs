@@ -5,7 +5,7 @@ use clap::Args;
 
 use super::fitting::{Saving, carry_out};
 use super::{Answer, Common, command_line, inputs, voice};
-use crate::train::recipe::{Job, Recipe};
+use residyn_train::recipe::{Job, Recipe};
 
 /// Train a hybrid, physics-only or data-driven model from scratch, on logs or on a simulated plant
 ///

@@ -5,8 +5,8 @@ use clap::Args;
 
 use super::fitting::{Saving, carry_out};
 use super::{Answer, Common, command_line, inputs};
-use crate::train::Checkpoint;
-use crate::train::recipe::{Job, Recipe};
+use residyn_train::Checkpoint;
+use residyn_train::recipe::{Job, Recipe};
 
 /// Fine-tune a saved checkpoint on new data (sim-to-real)
 ///

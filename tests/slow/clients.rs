@@ -1,6 +1,6 @@
 //! Real clients read what the program writes: Python with the packages of `tests/clients`.
 
-use residyn::report::EventFile;
+use residyn_report::EventFile;
 
 use crate::support::clients::client;
 use crate::support::demo::demo;

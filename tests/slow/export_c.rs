@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use rand::RngExt;
-use residyn::formats::{ExportModel, Predictions, Samples, find};
-use residyn::lanes::Row;
-use residyn::model::chain::model_text;
-use residyn::model::{Library, Model};
-use residyn::sim::{Commands, Hold, Integrator, StepTorque};
+use residyn_core::lanes::Row;
+use residyn_core::model::chain::model_text;
+use residyn_core::model::{Library, Model};
+use residyn_core::sim::{Commands, Hold, Integrator, StepTorque};
+use residyn_formats::{ExportModel, Predictions, Samples, find};
 use serde_json::json;
 use tempfile::TempDir;
 

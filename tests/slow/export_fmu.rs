@@ -3,7 +3,7 @@
 use std::io::{Cursor, Read};
 use std::process::Command;
 
-use residyn::formats::{ExportModel, Format, find};
+use residyn_formats::{ExportModel, Format, find};
 use serde_json::{Value, json};
 use zip::ZipArchive;
 

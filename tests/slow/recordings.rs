@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use residyn::data::{Column, Columns, Log};
+use residyn::read_standard_log;
+use residyn_core::data::{Column, Columns, Log};
+use residyn_io::read_rig_log;
 
 use crate::support::log_files::recordings;
 use crate::support::measured;
@@ -17,7 +19,7 @@ fn rig() -> Columns {
 }
 
 fn read(path: &Path, columns: &Columns) -> Result<Log, String> {
-    Log::read(path, 2, columns).map_err(|error| error.to_string())
+    read_rig_log(path, 2, columns).map_err(|error| error.to_string())
 }
 
 /// What is said of a recording that is refused.
@@ -67,7 +69,7 @@ fn every_recording_holds_the_same_trajectory() {
 fn joints_without_a_model_are_those_of_the_messages() {
     let Some(folder) = recordings() else { return };
     let wanted = read(&folder.join("run.csv"), &rig()).unwrap();
-    let found = Log::read_standard(folder.join("zstd.mcap")).unwrap();
+    let found = read_standard_log(folder.join("zstd.mcap")).unwrap();
     assert_eq!((&found.q[0], &found.q[1]), (&wanted.q[1], &wanted.q[0]));
 }
 
@@ -283,7 +285,7 @@ fn a_bag_of_a_real_arm_holds_what_its_csv_does() {
         joint_names: names.map(|name| format!("{name}_joint")).to_vec(),
         ..Columns::default()
     };
-    let at = |name: &str| Log::read(folder.join(name), 6, &columns).unwrap();
+    let at = |name: &str| read_rig_log(folder.join(name), 6, &columns).unwrap();
     let (bag, csv) = (
         at("ur10_exciting_trajectory.db3"),
         at("ur10_exciting_trajectory.csv"),

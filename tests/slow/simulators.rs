@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use residyn::formats::{ExportModel, FORMATS, find};
-use residyn::model::chain::model_text;
-use residyn::model::{Library, Model};
-use residyn::sim::Integrator;
+use residyn_core::model::chain::model_text;
+use residyn_core::model::{Library, Model};
+use residyn_core::sim::Integrator;
+use residyn_formats::{ExportModel, FORMATS, find};
 use serde_json::json;
 
 use crate::support::catalogue::{assert_near, points, rng};

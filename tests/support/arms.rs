@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use rand::RngExt;
-use residyn::data::Log;
-use residyn::model::chain::{Chain, model_text};
-use residyn::model::{Library, Model};
+use residyn_core::data::Log;
+use residyn_core::model::chain::{Chain, model_text};
+use residyn_core::model::{Library, Model};
 
 use super::catalogue::rng;
 

@@ -3,8 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use residyn::bench::{Cell, Source, read as grid};
-use residyn::model::Library;
+use residyn::read_model;
+use residyn_core::model::Library;
+use residyn_io::write_log;
+use residyn_validation::{Cell, Source, read as grid};
 use tempfile::TempDir;
 
 use super::paths::ours;
@@ -18,9 +20,9 @@ fn record(folder: &Path) {
         panic!("the grid's rigs are simulated")
     };
     simulation.condition.logs = 4;
-    let model = Library::built_in().model(&cell.model).unwrap();
+    let model = read_model(&cell.model, &Library::built_in()).unwrap();
     for log in cell.record(&model).unwrap().0 {
-        log.write(folder.join(&log.path)).unwrap();
+        write_log(&log, folder.join(&log.path)).unwrap();
     }
 }
 

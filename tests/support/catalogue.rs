@@ -1,20 +1,19 @@
 //! The catalogue of systems and effects, random points, comparisons.
 
-use std::path::Path;
-
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use residyn::data::Joint;
-use residyn::expr::{Graph, Program, SignForm};
-use residyn::lanes::Row;
-use residyn::model::{Dynamics, Effect, Entry, FittedEffect, Library, Model};
+use residyn::with_effects_in;
+use residyn_core::data::Joint;
+use residyn_core::expr::{Graph, Program, SignForm};
+use residyn_core::lanes::Row;
+use residyn_core::model::{Dynamics, Effect, Entry, FittedEffect, Library, Model};
 
 pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
 pub fn system(name: &str) -> Model {
-    Library::built_in().model(Path::new(name)).unwrap()
+    Library::built_in().model(name).unwrap()
 }
 
 pub fn all_systems() -> Vec<Model> {
@@ -73,7 +72,7 @@ v_m = { unit = "rad/s", typical = 2.0, bounds = [0.01, 100] }
 pub fn library_with_user_effect() -> Library {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("eddy_brake.toml"), USER_EFFECT).unwrap();
-    Library::built_in().with_folder(folder.path()).unwrap()
+    with_effects_in(folder.path(), Library::built_in()).unwrap()
 }
 
 /// A model of the catalog: a system alone, or with one effect on one joint.

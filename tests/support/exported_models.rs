@@ -4,12 +4,12 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use rand_chacha::ChaCha8Rng;
-use residyn::formats::ExportModel;
-use residyn::model::{
+use residyn_core::model::{
     Angles, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model, ModelWeights,
     ResidualOn,
 };
-use residyn::sim::{Integrator, SCHEMES};
+use residyn_core::sim::{Integrator, SCHEMES};
+use residyn_formats::ExportModel;
 use serde_json::json;
 use tempfile::TempDir;
 
@@ -117,7 +117,7 @@ pub fn all() -> Vec<(&'static str, ExportModel)> {
 /// A built-in system with effects appended to its file.
 pub fn system(name: &str, effects: &str) -> Model {
     let library = Library::built_in();
-    let declared = library.model(Path::new(name)).unwrap();
+    let declared = library.model(name).unwrap();
     Model::from_text(
         Path::new(name),
         &(declared.text + effects),

@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 
 use rand::RngExt;
 use rand_distr::{Distribution, Normal};
-use residyn::data::Log;
-use residyn::lanes::Row;
-use residyn::model::Dynamics;
-use residyn::sim::{Commands, Hold, RK4, Simulator};
+use residyn_core::data::Log;
+use residyn_core::lanes::Row;
+use residyn_core::model::Dynamics;
+use residyn_core::sim::{Commands, Hold, RK4, Simulator};
 
 use super::catalogue::rng;
 

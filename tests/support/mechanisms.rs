@@ -4,10 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use rand::RngExt;
-use residyn::expr::SignForm;
-use residyn::formats::{FORMATS, Format};
-use residyn::model::chain::{Chain, model_text};
-use residyn::model::{Dynamics, FittedEffect, Library, Model};
+use residyn_core::expr::SignForm;
+use residyn_core::model::chain::{Chain, model_text};
+use residyn_core::model::{Dynamics, FittedEffect, Library, Model};
+use residyn_formats::{FORMATS, Format};
 use serde_json::json;
 
 use super::catalogue::{dynamics, rng};

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use residyn::formats::{ClientError, ExportModel, Format, Predictions, Samples};
+use residyn_formats::{ClientError, ExportModel, Format, Predictions, Samples};
 use tempfile::TempDir;
 
 use super::catalogue::rng;

@@ -4,7 +4,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 
 /// The devices that every build has, with gradients.
 pub fn devices() -> Vec<Device> {
-    vec![residyn::train::Backend::NdArray.device()]
+    vec![residyn_train::Backend::NdArray.device()]
 }
 
 pub fn tensor(values: &[f64], device: &Device) -> Tensor<1> {

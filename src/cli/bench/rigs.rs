@@ -12,15 +12,15 @@ use serde_json::json;
 
 use super::shard::{self, Sharding, program_id};
 use super::{Answer, Common, interrupt, progress, told, unless_panic, voice};
-use crate::bench::rigs::{
+use crate::cli::call::{Begun, files};
+use residyn_core::model::Library;
+use residyn_formats::ClientError;
+use residyn_io::runs::{Identity, RunFolder};
+use residyn_report::ResultsPage;
+use residyn_train::ResidualTrainer;
+use residyn_validation::rigs::{
     Fold, Found, Line, Measured, Method, Rig, Tools, markdown, picture, read, summarise,
 };
-use crate::cli::call::{Begun, files};
-use crate::formats::ClientError;
-use crate::model::Library;
-use crate::report::ResultsPage;
-use crate::runs::{Identity, RunFolder};
-use crate::train::ResidualTrainer;
 
 /// Compare closing the loop with a plain structure, published parameters and mujoco.sysid on measured rigs
 ///

@@ -9,10 +9,11 @@ use serde_json::json;
 
 use crate::cli::shard::program_id;
 use crate::cli::{interrupt, progress, voice};
-use crate::closeloop::{Calibration, Calibrator, Searched, Simulation};
-use crate::files::content_id;
-use crate::model::{Model, Origin};
-use crate::runs::{InputFile, Lines, RunFolder};
+use residyn_core::closeloop::{Calibration, Calibrator, Searched, Simulation};
+use residyn_core::model::InputFile;
+use residyn_core::model::{Model, Origin};
+use residyn_io::files::content_id;
+use residyn_io::runs::{Lines, RunFolder};
 
 /// A simulation that was searched; one line of `simulations.jsonl`.
 #[derive(Serialize, Deserialize)]

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::cli::shard::program_id;
-use crate::files::content_id;
-use crate::runs::{Lines, RunFolder};
-use crate::train::Trained;
-use crate::train::recipe::{Job, Member};
+use residyn_io::files::content_id;
+use residyn_io::runs::{Lines, RunFolder};
+use residyn_train::Trained;
+use residyn_train::recipe::{Job, Member};
 
 /// Models that were trained, in the folder of a sweep.
 pub struct Store {

@@ -18,7 +18,7 @@ use std::time::Instant;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use residyn::files::content_hash;
+use residyn_io::files::content_hash;
 
 use self::edits::{Form, edited};
 use self::measure::{Cost, cost};

@@ -3,12 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use residyn::bench;
-use residyn::control::Task;
-use residyn::experiment::{self, undeclared_effect};
-use residyn::expr::parse;
-use residyn::formats::{self, RobotReader};
-use residyn::train::recipe::Recipe;
+use residyn_control::control::Task;
+use residyn_core::expr::parse;
+use residyn_experiments::experiment;
+use residyn_experiments::experiment::undeclared_effect;
+use residyn_formats as formats;
+use residyn_formats::RobotReader;
+use residyn_train::recipe::Recipe;
+use residyn_validation as bench;
 
 use crate::support::demo::demo;
 use crate::support::exported_models::{CHECKPOINT, exported};

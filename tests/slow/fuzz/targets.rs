@@ -4,19 +4,26 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use residyn::control::Task;
-use residyn::data::{Columns, Log, LogError, Quantity, audit};
-use residyn::experiment::{self, undeclared_effect};
-use residyn::expr::{Graph, Scope, SignForm, parse};
-use residyn::files::content_id;
-use residyn::formats::{ExportModel, FORMATS, Imported};
-use residyn::model::{Dynamics, Effect, Library, Model};
-use residyn::plant::Plant;
-use residyn::report::Report;
-use residyn::sim::Integrator;
-use residyn::train::recipe::Recipe;
-use residyn::train::{Backend, Checkpoint, save_imported};
-use residyn::{bench, rng};
+use residyn::read_model;
+use residyn::read_plant;
+use residyn::read_standard_log;
+use residyn::rng;
+use residyn::save_imported;
+use residyn_control::control::Task;
+use residyn_core::data::{Columns, Log, LogError, Quantity, audit};
+use residyn_core::expr::{Graph, Scope, SignForm, parse};
+use residyn_core::model::{Dynamics, Library, Model};
+use residyn_core::sim::Integrator;
+use residyn_experiments::experiment;
+use residyn_experiments::experiment::undeclared_effect;
+use residyn_formats::{ExportModel, FORMATS, Imported};
+use residyn_io::files::content_id;
+use residyn_io::read_effect;
+use residyn_io::read_rig_log;
+use residyn_report::Report;
+use residyn_train::recipe::Recipe;
+use residyn_train::{Backend, Checkpoint};
+use residyn_validation as bench;
 use serde_json::Value;
 
 use super::edits::Form;
@@ -76,13 +83,13 @@ fn log_of(path: &Path, driven_by: Quantity) -> Result<Log, LogError> {
         driven_by,
         ..Columns::default()
     };
-    let log = Log::read(path, 2, &columns)?;
+    let log = read_rig_log(path, 2, &columns)?;
     use_log(&log, &columns);
     Ok(log)
 }
 
 fn log(path: &Path) -> bool {
-    let standard = Log::read_standard(path);
+    let standard = read_standard_log(path);
     if let Ok(log) = &standard {
         use_log(log, &Columns::default());
     }
@@ -164,7 +171,7 @@ fn formula() {
 #[test]
 fn model() {
     let read = |path: &Path| {
-        let model = Model::read(path, library().effects());
+        let model = read_model(path, library());
         model.as_ref().is_ok_and(|model| {
             use_model(model);
             true
@@ -183,11 +190,11 @@ fn model() {
 #[test]
 fn effect() {
     let read = |path: &Path| {
-        let Ok(effect) = Effect::read(path) else {
+        let Ok(effect) = read_effect(path) else {
             return false;
         };
         for system in ["pendulum", "acrobot"] {
-            let system = library().model(system).unwrap();
+            let system = read_model(system, library()).unwrap();
             let typical: Vec<f64> = effect.parameters.iter().map(|p| p.typical).collect();
             let fitted = fitted(&effect, 0, &typical);
             if system.can_carry(&effect, fitted.joint).is_ok() {
@@ -243,7 +250,7 @@ fn task() {
 #[test]
 fn plant() {
     let read = |path: &Path| {
-        let Ok(plant) = Plant::read(path, library()) else {
+        let Ok(plant) = read_plant(path, library()) else {
             return false;
         };
         evaluate(&plant.dynamics());

@@ -6,10 +6,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use rand::RngExt;
-use residyn::closeloop::Split;
-use residyn::data::{Joint, Log};
-use residyn::plant::Plant;
+use residyn::read_logs;
+use residyn::read_model;
 use residyn::{Finding, Library, Outcome, Request, close_loop, rng};
+use residyn_core::closeloop::Split;
+use residyn_core::data::{Joint, Log};
+use residyn_io::plant_from_text;
 
 use super::times;
 
@@ -75,7 +77,7 @@ const ON_TWO: [Hidden; 3] = [
 impl Rig {
     fn new(plant: &str, text: &'static str, hidden: Hidden, seed: u64) -> Self {
         let library = Library::built_in();
-        let mut plant = Plant::from_text(Path::new("rig.toml"), plant, &library).unwrap();
+        let mut plant = plant_from_text(Path::new("rig.toml"), plant, &library).unwrap();
         let mut rng = rng(seed);
         let mut name = format!("{} {seed}", plant.system.name);
         for (effect, joint, values) in hidden {
@@ -255,8 +257,8 @@ impl Written {
         let folder = tempfile::tempdir().unwrap();
         let (model, paths) = self.write(folder.path());
         let library = Library::built_in();
-        let model = library.model(&model).unwrap();
-        let mut train = model.read_logs(order.map(|k| &paths[k])).unwrap();
+        let model = read_model(&model, &library).unwrap();
+        let mut train = read_logs(order.map(|k| &paths[k]), &model).unwrap();
         let test = train.split_off(3);
         let request = Request::new(&model, &library, Split::given(train, test));
         Findings::of(&close_loop(request, &mut rng(0), &()).unwrap())
@@ -303,7 +305,7 @@ impl Findings {
         let mut numbers: Vec<_> = found().flat_map(values).chain(declared).collect();
         let left = &outcome.remainder.unexplained;
         numbers.push(("unexplained".to_owned(), left.fraction));
-        let alternative = |rival: &residyn::closeloop::Alternative| {
+        let alternative = |rival: &residyn_core::closeloop::Alternative| {
             let each = rival.effects.iter();
             each.map(|effect| (effect.effect.name.clone(), effect.joint.number()))
                 .collect()

@@ -2,7 +2,7 @@
 
 use proptest::num::f64::{NEGATIVE, NORMAL, POSITIVE, SUBNORMAL};
 use proptest::prelude::*;
-use residyn::expr::{Graph, Program, Scope, SignForm, parse};
+use residyn_core::expr::{Graph, Program, Scope, SignForm, parse};
 
 use super::{cases, same_number};
 

@@ -5,10 +5,10 @@ use std::ops::RangeInclusive;
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use residyn::formats::{ExportError, ExportModel, find, write_back};
-use residyn::model::chain::{Chain, Drivetrain, Inertia, Joint, Pose, Spring};
-use residyn::model::{Dynamics, Model};
-use residyn::sim::Integrator;
+use residyn_core::model::chain::{Chain, Drivetrain, Inertia, Joint, Pose, Spring};
+use residyn_core::model::{Dynamics, Model};
+use residyn_core::sim::Integrator;
+use residyn_formats::{ExportError, ExportModel, find, write_back};
 
 use super::cases;
 use crate::support::catalogue::points;
@@ -222,7 +222,7 @@ proptest! {
 /// A description and its weights, read back.
 mod descriptions {
     use residyn::Library;
-    use residyn::formats::Imported;
+    use residyn_formats::Imported;
 
     use super::*;
 

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use proptest::prelude::*;
-use residyn::data::{Joint, Quantity};
-use residyn::model::chain::model_text;
-use residyn::model::{Effect, FittedEffect, Library, Model, OwnValue, Status};
+use residyn_core::data::{Joint, Quantity};
+use residyn_core::model::chain::model_text;
+use residyn_core::model::{Effect, FittedEffect, Library, Model, OwnValue, Status};
 
 use super::mechanisms::chain;
 use super::{cases, same_number};

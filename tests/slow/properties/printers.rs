@@ -1,10 +1,10 @@
 //! Exported formulas: what other programs compute of them.
 
 use proptest::prelude::*;
-use residyn::expr::parse_finite;
-use residyn::formats::{ExportModel, Samples, find};
-use residyn::model::{Library, Model};
-use residyn::sim::Integrator;
+use residyn_core::expr::parse_finite;
+use residyn_core::model::{Library, Model};
+use residyn_core::sim::Integrator;
+use residyn_formats::{ExportModel, Samples, find};
 use serde_json::json;
 
 use super::cases;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use proptest::prelude::*;
-use residyn::report::Report;
+use residyn_report::Report;
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -1,0 +1,131 @@
+use std::collections::VecDeque;
+
+use rand::{Rng, RngExt};
+use thiserror::Error;
+
+use super::Task;
+use crate::plan::{Planner, Start};
+use residyn_core::sim::batch::Block;
+
+/// Decides the torque of each step.
+pub trait Policy {
+    /// The torque (N m or N, one a joint) to hold from `time_s` on, given the sensor readings `measured` (positions, then
+    /// velocities).
+    fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64>;
+}
+
+/// A plan of which no candidate has a finite return.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error(
+    "no candidate of the plan at {time_s:.3} s has a finite return: the model leaves the finite numbers in all of them; mend \
+     the model or the objective of the task, or shorten the planner's horizon"
+)]
+pub struct LostPlan {
+    pub time_s: f64,
+}
+
+/// Model-predictive control with a receding horizon: the first steps of the best plan are executed; the rest of it
+/// initialises the search for the next.
+pub struct Controller<'p, 'r> {
+    planner: &'p Planner<Block<'r>>,
+    replan: usize,
+    plan: VecDeque<Vec<f64>>,
+    /// The last torques, as many as the model's delays need.
+    past: VecDeque<Vec<f64>>,
+    memory: usize,
+    decisions: usize,
+    diverged: usize,
+    lost: Vec<f64>,
+}
+
+impl<'p, 'r> Controller<'p, 'r> {
+    /// Executes `replan` steps of each plan; `memory` is the number of past torques that the model needs.
+    pub fn new(planner: &'p Planner<Block<'r>>, replan: usize, memory: usize) -> Self {
+        planner.forget();
+        Self {
+            planner,
+            replan,
+            plan: VecDeque::new(),
+            past: VecDeque::new(),
+            memory,
+            decisions: 0,
+            diverged: 0,
+            lost: Vec::new(),
+        }
+    }
+
+    /// Number of plans made.
+    pub fn decisions(&self) -> usize {
+        self.decisions
+    }
+
+    /// Number of candidates, over all plans, whose rollout diverged.
+    pub fn diverged(&self) -> usize {
+        self.diverged
+    }
+
+    /// When plans were made of which no candidate had a finite return \[s\]: the model left the finite numbers in all of them.
+    pub fn lost(&self) -> &[f64] {
+        &self.lost
+    }
+
+    /// Whether all plans had a candidate with a finite return.
+    ///
+    /// # Errors
+    /// The first that had none.
+    pub fn check(&self) -> Result<(), LostPlan> {
+        let lost = self.lost.first().map(|&time_s| LostPlan { time_s });
+        lost.map_or(Ok(()), Err)
+    }
+
+    fn decide(&mut self, measured: &[f64], time_s: f64) {
+        if self.decisions > 0 {
+            self.planner.shift(self.replan);
+        }
+        let start = Start::after(measured, time_s, self.past.make_contiguous());
+        let plan = self.planner.plan(start);
+        self.plan = plan.inputs.into_iter().take(self.replan).collect();
+        self.decisions += 1;
+        self.diverged += plan.diverged;
+        if !plan.best.is_finite() {
+            self.lost.push(time_s);
+        }
+    }
+}
+
+impl Policy for Controller<'_, '_> {
+    fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64> {
+        if self.plan.is_empty() {
+            self.decide(measured, time_s);
+        }
+        let torque = self.plan.pop_front().expect("a plan has steps");
+        self.past.push_back(torque.clone());
+        if self.past.len() > self.memory {
+            self.past.pop_front();
+        }
+        torque
+    }
+}
+
+/// Uniformly random torques, new in each step.
+pub struct RandomTorque<'t, R> {
+    ranges: &'t [[f64; 2]],
+    rng: R,
+}
+
+impl<'t, R: Rng> RandomTorque<'t, R> {
+    /// Within the bounds of a task.
+    pub fn new(task: &'t Task, rng: R) -> Self {
+        Self {
+            ranges: &task.torque,
+            rng,
+        }
+    }
+}
+
+impl<R: Rng> Policy for RandomTorque<'_, R> {
+    fn torque(&mut self, _: &[f64], _: f64) -> Vec<f64> {
+        let draw = |[low, high]: &[f64; 2]| self.rng.random_range(*low..=*high);
+        self.ranges.iter().map(draw).collect()
+    }
+}

@@ -1,0 +1,14 @@
+//! Model-predictive control of a simulated plant: tasks, the controller that plans with a model, and episodes.
+
+mod controller;
+mod episode;
+mod figure;
+mod predictor;
+mod session;
+mod task;
+
+pub use controller::{Controller, LostPlan, Policy, RandomTorque};
+pub use episode::{Episode, EpisodeError, Stretch, drive, episode};
+pub use predictor::Predictor;
+pub use session::with_controller;
+pub use task::{Goal, NoTask, PlantSettings, Task, TaskError};

@@ -1,0 +1,59 @@
+use crate::plan::Objective;
+use residyn_core::model::{Dynamics, MlpWeights};
+use residyn_core::sim::Integrator;
+use residyn_core::sim::batch::Rollouts;
+
+/// A model as the planner uses it: equations with their values, networks whose outputs are added to their derivative,
+/// and the integrator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Predictor {
+    equations: Dynamics,
+    networks: Vec<MlpWeights>,
+    integrator: Integrator,
+}
+
+impl Predictor {
+    /// A model of equations alone.
+    pub fn of_equations(equations: Dynamics, integrator: Integrator) -> Self {
+        Self::new(equations, Vec::new(), integrator)
+    }
+
+    /// Equations and the networks whose outputs are added to their derivative; `integrator` is the one that the model
+    /// was trained through.
+    pub fn new(equations: Dynamics, networks: Vec<MlpWeights>, integrator: Integrator) -> Self {
+        Self {
+            equations,
+            networks,
+            integrator,
+        }
+    }
+
+    /// Name of the system.
+    pub fn system(&self) -> &str {
+        &self.equations.name
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.equations.joints
+    }
+
+    /// Rollouts of the model under this objective, in steps of `step_s` seconds.
+    ///
+    /// # Panics
+    /// When the objective is of another number of joints.
+    pub fn rollouts(&self, objective: &Objective, step_s: f64) -> Rollouts {
+        let Self {
+            equations,
+            networks,
+            integrator,
+        } = self;
+        Rollouts::new(
+            equations,
+            networks,
+            objective.program(),
+            *integrator,
+            step_s,
+        )
+    }
+}

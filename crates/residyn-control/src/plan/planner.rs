@@ -1,0 +1,191 @@
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+use rand_chacha::ChaCha8Rng;
+
+use super::Settings;
+use super::noise::Noise;
+use super::population::Population;
+use super::proposal::Proposal;
+use residyn_core::lanes::{Arch, WorkerPool};
+use residyn_core::sim::batch::{Rows, W};
+
+/// Evaluates candidate input sequences. There is one evaluator for each block of candidates.
+pub trait Evaluate: Send {
+    /// Initial condition of a plan.
+    type Start;
+    /// The initial condition with everything that all candidates share.
+    type Prepared: Send + Sync;
+
+    /// Prepare a plan of `steps` steps from `start`.
+    fn prepare(&self, start: Self::Start, steps: usize) -> Self::Prepared;
+
+    /// The return of each candidate of a block from `start` under `inputs` (`[step * n + input]`); NaN or infinite
+    /// where the rollout diverges.
+    fn returns(&mut self, start: &Self::Prepared, inputs: &[Rows], returns: &mut Rows);
+}
+
+/// A search for the inputs that maximise a return, by the [`Method`](super::Method) of its settings: draw sequences,
+/// evaluate them, and draw the next ones near the best. The rest of a plan is the initial guess of the next search.
+///
+/// Plan repeatedly within [`Planner::with_workers`] to use all cores.
+///
+/// Candidates are clipped to the bounds before they are evaluated. The result is the same on any
+/// number of processor cores: each block of candidates has a random stream of its own.
+pub struct Planner<E: Evaluate> {
+    settings: Settings,
+    // Locks, since the workers share all of it with the calling thread. They are never contended.
+    start: RwLock<Option<E::Prepared>>,
+    proposal: RwLock<Proposal>,
+    blocks: Vec<Mutex<Candidates<E>>>,
+    pool: WorkerPool,
+}
+
+/// One block of candidates.
+struct Candidates<E> {
+    evaluate: E,
+    rng: ChaCha8Rng,
+    noise: Noise,
+    arch: Arch,
+    /// `[step * n + input]`
+    inputs: Vec<Rows>,
+    returns: Rows,
+}
+
+/// The result of a search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// `[step][input]`
+    pub inputs: Vec<Vec<f64>>,
+    /// The best return of a candidate in the last iteration; minus infinity where all of them diverged.
+    pub best: f64,
+    /// Number of candidates, over all iterations, whose return was not finite; they rank last.
+    pub diverged: usize,
+}
+
+impl<E: Evaluate> Planner<E> {
+    /// A search for inputs within `bounds`; `evaluate` makes one evaluator for each block of candidates.
+    ///
+    /// # Panics
+    /// When [`Settings::check`] refuses the settings, or there are no bounds or an empty range.
+    pub fn new(
+        settings: &Settings,
+        bounds: &[[f64; 2]],
+        evaluate: impl Fn() -> E,
+        rng: &ChaCha8Rng,
+    ) -> Self {
+        settings.check().expect("settings that have been checked");
+        assert!(!bounds.is_empty(), "something to search");
+        assert!(
+            bounds.iter().all(|[low, high]| low < high),
+            "ranges that are not empty"
+        );
+        let Settings {
+            population,
+            horizon,
+            method,
+            ..
+        } = *settings;
+        let noise = method.search().noise(horizon, bounds.len());
+        let block = |index: usize| {
+            let mut rng = rng.clone();
+            rng.set_stream(index as u64);
+            Candidates {
+                evaluate: evaluate(),
+                rng,
+                noise: noise.clone(),
+                arch: Arch::new(),
+                inputs: vec![Rows::splat(0.0); horizon * bounds.len()],
+                returns: Rows::splat(0.0),
+            }
+        };
+        Self {
+            settings: *settings,
+            start: RwLock::new(None),
+            proposal: RwLock::new(Proposal::new(bounds, horizon)),
+            blocks: (0..population.div_ceil(W))
+                .map(|index| Mutex::new(block(index)))
+                .collect(),
+            pool: WorkerPool::new(),
+        }
+    }
+
+    /// Call `body` with all cores available to the searches in it. Outside of it a search runs on one core.
+    pub fn with_workers<R>(&self, body: impl FnOnce() -> R) -> R {
+        self.pool
+            .with_workers(&|index| self.draw_and_evaluate(index), body)
+    }
+
+    /// Discard the last plan: the next search starts from the middle of the bounds.
+    pub fn forget(&self) {
+        write(&self.proposal).forget();
+    }
+
+    /// Drop the first `steps` of the plan, which have been executed: the next search starts from the rest, continued
+    /// by the middle of the bounds.
+    pub fn shift(&self, steps: usize) {
+        write(&self.proposal).shift(steps);
+    }
+
+    /// Search for the best inputs from `start`.
+    pub fn plan(&self, start: E::Start) -> Plan {
+        let Settings {
+            population,
+            iterations,
+            horizon,
+            method,
+        } = self.settings;
+        let start = lock(&self.blocks[0]).evaluate.prepare(start, horizon);
+        *write(&self.start) = Some(start);
+        write(&self.proposal).begin(method.search().deviation());
+        let (mut best, mut diverged) = (f32::NEG_INFINITY, 0);
+        for _ in 0..iterations {
+            let tasks = self.blocks.len();
+            self.pool.run(tasks, &|index| self.draw_and_evaluate(index));
+            let blocks: Vec<_> = self.blocks.iter().map(lock).collect();
+            let evaluated = blocks.iter().map(|b| (b.inputs.as_slice(), &b.returns));
+            let population = Population::new(evaluated, population);
+            let mut proposal = write(&self.proposal);
+            method.search().learn(&population, &mut proposal);
+            best = population.best();
+            diverged += population.diverged();
+        }
+        Plan {
+            inputs: read(&self.proposal).plan(),
+            best: f64::from(best),
+            diverged,
+        }
+    }
+
+    fn draw_and_evaluate(&self, index: usize) {
+        let mut block = lock(&self.blocks[index]);
+        block.draw(&read(&self.proposal), index);
+        block.evaluate(read(&self.start).as_ref().expect("a search has a start"));
+    }
+}
+
+impl<E: Evaluate> Candidates<E> {
+    /// Draw the candidates of the block with this index.
+    fn draw(&mut self, from: &Proposal, index: usize) {
+        self.noise.fill(self.arch, &mut self.rng, &mut self.inputs);
+        from.place(self.arch, index, &mut self.inputs);
+    }
+
+    fn evaluate(&mut self, start: &E::Prepared) {
+        self.evaluate
+            .returns(start, &self.inputs, &mut self.returns);
+    }
+}
+
+// A lock is poisoned only after a panic, which ends the search anyway.
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn read<T>(lock: &RwLock<T>) -> RwLockReadGuard<'_, T> {
+    lock.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn write<T>(lock: &RwLock<T>) -> RwLockWriteGuard<'_, T> {
+    lock.write().unwrap_or_else(PoisonError::into_inner)
+}

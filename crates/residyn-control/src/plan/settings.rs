@@ -1,0 +1,73 @@
+use serde::{Deserialize, Serialize};
+
+use super::limits::{SettingsError, whole};
+use super::method::Search;
+use super::{Cem, Icem, Mppi};
+use residyn_core::limits::{CANDIDATES, HORIZON, ITERATIONS};
+
+/// How a planner searches. In a file all of it is one table:
+///
+/// ```toml
+/// method = "cem"
+/// population = 300
+/// elite = 20
+/// iterations = 10
+/// horizon = 80
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Candidates evaluated in each iteration.
+    pub population: usize,
+    pub iterations: usize,
+    /// Steps of a plan.
+    pub horizon: usize,
+    #[serde(flatten)]
+    pub method: Method,
+}
+
+/// How the next candidates come from the last.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "method", rename_all = "snake_case")]
+pub enum Method {
+    Cem(Cem),
+    Icem(Icem),
+    Mppi(Mppi),
+}
+
+impl Settings {
+    /// Refuse what no search can run with.
+    ///
+    /// # Errors
+    /// One sentence that names the key, its value and what it may be.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        whole("population", self.population, CANDIDATES)?;
+        whole("iterations", self.iterations, ITERATIONS)?;
+        whole("horizon", self.horizon, HORIZON)?;
+        self.method.search().check(self.population)
+    }
+}
+
+impl Method {
+    /// The names that files and the command line know.
+    pub const NAMES: [&str; 3] = ["cem", "icem", "mppi"];
+
+    /// A method with its usual settings; methods that have an elite take the share that is published for the
+    /// cross-entropy method here, 20 of 300.
+    pub fn usual(name: &str, population: usize) -> Option<Self> {
+        let elite = (population / 15).max(1);
+        match name {
+            "cem" => Some(Self::Cem(Cem { elite })),
+            "icem" => Some(Self::Icem(Icem::new(elite))),
+            "mppi" => Some(Self::Mppi(Mppi::default())),
+            _ => None,
+        }
+    }
+
+    pub(super) fn search(&self) -> &dyn Search {
+        match self {
+            Self::Cem(cem) => cem,
+            Self::Icem(icem) => icem,
+            Self::Mppi(mppi) => mppi,
+        }
+    }
+}

@@ -1,0 +1,373 @@
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::proposal::Proposal;
+use super::{Cem, Evaluate, Icem, Method, Mppi, Plan, Planner, Settings};
+use residyn_core::lanes::Arch;
+use residyn_core::sim::batch::{Rows, W};
+
+mod noise;
+mod swing_up;
+
+const SETTINGS: Settings = Settings {
+    population: 300,
+    iterations: 10,
+    horizon: 6,
+    method: Method::Cem(Cem { elite: 20 }),
+};
+
+fn rng(seed: u64) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(seed)
+}
+
+/// The closer every input is to a goal the better; beyond 2 nobody knows.
+struct Near;
+
+impl Evaluate for Near {
+    type Start = f32;
+    type Prepared = f32;
+
+    fn prepare(&self, goal: f32, _: usize) -> f32 {
+        goal
+    }
+
+    fn returns(&mut self, goal: &f32, inputs: &[Rows], returns: &mut Rows) {
+        for lane in 0..W {
+            let off = inputs
+                .iter()
+                .map(|row| (row[lane] - goal).powi(2))
+                .sum::<f32>();
+            let known = inputs.iter().all(|row| row[lane] < 2.0);
+            returns[lane] = if known { -off } else { f32::NAN };
+        }
+    }
+}
+
+fn methods() -> [Method; 3] {
+    let narrow = Mppi {
+        deviation: 0.1,
+        ..Mppi::default()
+    };
+    [
+        Method::Cem(Cem { elite: 20 }),
+        Method::Icem(Icem::new(20)),
+        Method::Mppi(narrow),
+    ]
+}
+
+/// The usual settings with each method.
+fn all() -> [Settings; 3] {
+    methods().map(|method| Settings { method, ..SETTINGS })
+}
+
+fn near(settings: &Settings, bounds: &[[f64; 2]], seed: u64) -> Planner<Near> {
+    Planner::new(settings, bounds, || Near, &rng(seed))
+}
+
+/// How far a plan is from the goal at most.
+fn off(plan: &Plan, goal: f64) -> f64 {
+    let off = plan.inputs.iter().flatten().map(|x| (x - goal).abs());
+    off.fold(0.0, f64::max)
+}
+
+#[test]
+fn the_search_finds_the_best_sequence() {
+    let [cem, icem, _] = all();
+    for settings in [cem, icem] {
+        let plan = near(&settings, &[[-3.0, 3.0]; 2], 1).plan(0.7);
+        assert_eq!(plan.inputs.len(), SETTINGS.horizon);
+        assert!(off(&plan, 0.7) < 0.1, "{settings:?} {plan:?}");
+        assert!(plan.best > -0.05, "{settings:?} {plan:?}");
+    }
+}
+
+#[test]
+fn mppi_finds_the_best_sequence_within_its_standard_deviation() {
+    let settings = |temperature: f64| Settings {
+        method: Method::Mppi(Mppi {
+            temperature,
+            deviation: 0.1,
+        }),
+        ..SETTINGS
+    };
+    let found = |temperature: f64| {
+        let plan = near(&settings(temperature), &[[-3.0, 3.0]; 2], 1).plan(0.7);
+        off(&plan, 0.7)
+    };
+    // One standard deviation is 0.3. The hotter, the more candidates a mean is taken over.
+    assert!(
+        found(0.05) < 0.3 && found(0.3) < 0.5 * found(0.01),
+        "{} {} {}",
+        found(0.05),
+        found(0.3),
+        found(0.01)
+    );
+}
+
+#[test]
+fn inputs_stay_within_their_bounds() {
+    for settings in all() {
+        let plan = near(&settings, &[[-3.0, 3.0], [-0.5, 0.1]], 2).plan(1.0);
+        for step in plan.inputs {
+            let kept =
+                (-3.0..=3.0).contains(&step[0]) && (-0.5..=0.1f32).contains(&(step[1] as f32));
+            let scatters = matches!(settings.method, Method::Mppi(_));
+            let reached = (step[0] - 1.0).abs() < 0.1 && step[1] > 0.08;
+            assert!(kept && (reached || scatters), "{settings:?} {step:?}");
+        }
+    }
+}
+
+#[test]
+fn diverging_candidates_rank_last() {
+    for settings in all() {
+        // The best known sequences border on those that nobody knows.
+        let plan = near(&settings, &[[-3.0, 3.0]], 3).plan(2.5);
+        let inputs = || plan.inputs.iter().flatten();
+        assert!(
+            inputs().all(|x| (1.5..2.0).contains(x)),
+            "{settings:?} {plan:?}"
+        );
+        assert!(plan.diverged > 0, "{settings:?} {plan:?}");
+        let lost = near(&settings, &[[2.5, 3.0]], 3).plan(2.5);
+        assert_eq!(lost.best, f64::NEG_INFINITY);
+        assert_eq!(lost.diverged, SETTINGS.population * SETTINGS.iterations);
+        assert!(lost.inputs.iter().flatten().all(|x| *x == 2.75));
+    }
+}
+
+#[test]
+fn the_rest_of_a_plan_starts_the_next_search() {
+    let [cem, _, mppi] = all();
+    for settings in [cem, mppi] {
+        let short = Settings {
+            iterations: 1,
+            ..settings
+        };
+        let errors = |warm: bool| {
+            let search = near(&short, &[[-3.0, 3.0]], 4);
+            for _ in 0..8 {
+                search.plan(-1.5);
+            }
+            search.shift(2);
+            if !warm {
+                search.forget();
+            }
+            let plan = search.plan(-1.5);
+            let off = plan.inputs[..4].iter().map(|step| (step[0] + 1.5).abs());
+            off.sum::<f64>()
+        };
+        let [warm, cold] = [true, false].map(errors);
+        assert!(warm < 0.5 * cold, "{settings:?} {warm} {cold}");
+    }
+}
+
+#[test]
+fn a_plan_does_not_depend_on_the_number_of_cores() {
+    for settings in all() {
+        let alone = near(&settings, &[[-3.0, 3.0]], 5).plan(0.3);
+        let with_help = near(&settings, &[[-3.0, 3.0]], 5);
+        assert_eq!(with_help.with_workers(|| with_help.plan(0.3)), alone);
+        let other = near(&settings, &[[-3.0, 3.0]], 6);
+        assert_ne!(other.plan(0.3), alone);
+    }
+}
+
+#[test]
+fn icem_never_loses_its_best_candidate() {
+    let plans: Vec<Plan> = (1..=SETTINGS.iterations)
+        .map(|iterations| {
+            let settings = Settings {
+                iterations,
+                method: Method::Icem(Icem {
+                    keep: 0.0,
+                    ..Icem::new(20)
+                }),
+                ..SETTINGS
+            };
+            near(&settings, &[[-3.0, 3.0]], 8).plan(0.7)
+        })
+        .collect();
+    for pair in plans.windows(2) {
+        assert!(pair[0].best <= pair[1].best, "{pair:?}");
+    }
+    for plan in plans {
+        let sequence: Vec<_> = plan
+            .inputs
+            .iter()
+            .map(|step| Rows::splat(step[0] as f32))
+            .collect();
+        let mut returns = Rows::splat(0.0);
+        Near.returns(&0.7, &sequence, &mut returns);
+        assert_eq!(f64::from(returns[0]), plan.best);
+    }
+}
+
+#[test]
+fn icem_keeps_its_best_candidates_from_one_search_to_the_next() {
+    let settings = Settings {
+        iterations: 1,
+        method: Method::Icem(Icem::new(20)),
+        ..SETTINGS
+    };
+    let search = near(&settings, &[[-3.0, 3.0]], 12);
+    let bests = |_: usize| search.plan(0.7).best;
+    let bests: Vec<f64> = (0..8).map(bests).collect();
+    assert!(bests.is_sorted() && bests[0] < bests[7], "{bests:?}");
+}
+
+#[test]
+fn the_unexecuted_part_of_a_kept_sequence_is_a_candidate() {
+    let mut proposal = Proposal::new(&[[-3.0, 3.0]; 2], 3);
+    proposal.begin(0.5);
+    proposal.keep(vec![vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6]]);
+    proposal.shift(1);
+    let mut rows = vec![Rows::splat(1.0); 6];
+    proposal.place(Arch::new(), 0, &mut rows);
+    let lane = |lane: usize| -> Vec<f32> { rows.iter().map(|row| row[lane]).collect() };
+    assert_eq!(lane(0), [0.3, 0.4, 0.5, 0.6, 1.5, 1.5]);
+    assert_eq!(lane(1), [1.5; 6]);
+    proposal.forget();
+    proposal.place(Arch::new(), 0, &mut rows);
+    assert_ne!(rows[0][0], 0.3);
+}
+
+/// As [`Near`], in other units.
+struct Scaled;
+
+impl Evaluate for Scaled {
+    type Start = f32;
+    type Prepared = f32;
+
+    fn prepare(&self, goal: f32, _: usize) -> f32 {
+        goal
+    }
+
+    fn returns(&mut self, goal: &f32, inputs: &[Rows], returns: &mut Rows) {
+        Near.returns(goal, inputs, returns);
+        // A power of two: nothing is rounded.
+        returns.iter_mut().for_each(|value| *value *= 1024.0);
+    }
+}
+
+#[test]
+fn mppi_is_invariant_to_scale_and_offset_of_returns() {
+    let settings = Settings {
+        method: Method::Mppi(Mppi::default()),
+        ..SETTINGS
+    };
+    let scaled = Planner::new(&settings, &[[-3.0, 3.0]], || Scaled, &rng(9));
+    let plan = near(&settings, &[[-3.0, 3.0]], 9).plan(0.7);
+    assert_eq!(scaled.plan(0.7).inputs, plan.inputs);
+}
+
+#[test]
+fn settings_are_read_from_a_file_and_written_back() {
+    let read = |rest: &str| -> Result<Settings, toml::de::Error> {
+        let text = format!("population = 300\niterations = 10\nhorizon = 6\n{rest}");
+        toml::from_str(&text)
+    };
+    let written = [
+        ("method = 'cem'\nelite = 20", methods()[0]),
+        ("method = 'icem'\nelite = 20", methods()[1]),
+        ("method = 'mppi'\ndeviation = 0.1", methods()[2]),
+    ];
+    for (text, method) in written {
+        let settings = Settings { method, ..SETTINGS };
+        assert_eq!(read(text).unwrap(), settings);
+        let copy = toml::from_str(&toml::to_string(&settings).unwrap());
+        assert_eq!(copy, Ok(settings));
+    }
+    for (text, wanted) in [
+        ("method = 'cem'", "missing field `elite`"),
+        (
+            "method = 'cem'\nelite = 20\nelit = 2",
+            "unknown field `elit`",
+        ),
+        ("method = 'mppi'\nelite = 20", "unknown field `elite`"),
+        (
+            "method = 'sac'",
+            "unknown variant `sac`, expected one of `cem`",
+        ),
+    ] {
+        let found = read(text).unwrap_err().to_string();
+        assert!(found.contains(wanted), "{text}: {found}");
+    }
+}
+
+#[test]
+fn usual_settings_are_accepted() {
+    for settings in all() {
+        assert_eq!(settings.check(), Ok(()));
+    }
+}
+
+#[test]
+fn bad_settings_are_refused_by_name() {
+    let [cem, icem, mppi] = all();
+    let icem_with = |change: fn(&mut Icem)| {
+        let mut method = Icem::new(20);
+        change(&mut method);
+        Settings {
+            method: Method::Icem(method),
+            ..icem
+        }
+    };
+    let mppi_with = |temperature: f64, deviation: f64| Settings {
+        method: Method::Mppi(Mppi {
+            temperature,
+            deviation,
+        }),
+        ..mppi
+    };
+    let with = |population: usize, iterations: usize, horizon: usize| Settings {
+        population,
+        iterations,
+        horizon,
+        ..cem
+    };
+    for (settings, wanted) in [
+        (
+            with(0, 1, 1),
+            "`population` is 0; it must be a whole number from 1 to 100000",
+        ),
+        (
+            with(19, 1, 1),
+            "`elite` is 20; it must be a whole number from 1 to 19, the population",
+        ),
+        (
+            with(20, 0, 1),
+            "`iterations` is 0; it must be a whole number from 1 to 10000",
+        ),
+        (
+            with(20, 1, 2001),
+            "`horizon` is 2001; it must be a whole number from 1 to 2000",
+        ),
+        (
+            icem_with(|m| m.elite = 0),
+            "`elite` is 0; it must be a whole number from 1 to 300, the population",
+        ),
+        (
+            icem_with(|m| m.noise_exponent = -1.0),
+            "`noise_exponent` is -1; it must be from 0 to 10",
+        ),
+        (
+            icem_with(|m| m.keep = 1.5),
+            "`keep` is 1.5; it must be from 0 to 1",
+        ),
+        (
+            icem_with(|m| m.momentum = f64::NAN),
+            "`momentum` is NaN; it must be at least 0 and below 1",
+        ),
+        (
+            mppi_with(0.0, 0.1),
+            "`temperature` is 0; it must be above 0 and at most 10",
+        ),
+        (
+            mppi_with(0.1, f64::INFINITY),
+            "`deviation` is inf; it must be above 0 and at most 10",
+        ),
+    ] {
+        assert_eq!(settings.check().unwrap_err().to_string(), wanted);
+    }
+}

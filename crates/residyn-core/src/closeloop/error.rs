@@ -1,0 +1,47 @@
+use thiserror::Error;
+
+use crate::data::Quantity;
+use crate::identify::FitError;
+use crate::limits::FITTED_PARAMETERS;
+use crate::model::Model;
+
+/// Why the loop could not be closed at all.
+#[derive(Debug, Error)]
+pub enum StudyError {
+    #[error(
+        "the test logs hold no window of {shortest_s} s to score a model on; give longer test logs, or leave out less of \
+         them{found}"
+    )]
+    NoTest { shortest_s: f64, found: String },
+    #[error(
+        "{model} gives accelerations, and no torques can be compared; give its equations as `mass` and `bias`, or compare the \
+         motion"
+    )]
+    NoTorques { model: String },
+    #[error(
+        "{model} is driven by commands, and its logs show no torques that could be compared; compare the motion"
+    )]
+    Commanded { model: String },
+    #[error(
+        "calibrating simulates motion, and here torques were compared; do not calibrate, or compare the motion"
+    )]
+    NotOfMotion,
+    #[error(
+        "{model} has {free} free parameters, and at most {FITTED_PARAMETERS} are fitted at once; mark those that are known \
+         `fixed = true`"
+    )]
+    TooManyParameters { model: String, free: usize },
+    #[error("{0}")]
+    Fit(#[from] FitError),
+}
+
+impl StudyError {
+    /// Why the torques of a model cannot be compared with those of logs.
+    pub(super) fn without_torques(model: &Model) -> Self {
+        let name = model.name.clone();
+        match model.driven_by() {
+            Quantity::Command => Self::Commanded { model: name },
+            _ => Self::NoTorques { model: name },
+        }
+    }
+}

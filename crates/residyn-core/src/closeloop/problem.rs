@@ -1,0 +1,352 @@
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+use super::fitted::Fitted;
+use super::settings::{FitSettings, Settings};
+use super::space::Space;
+use super::split::by_numbers;
+use crate::data::{Audit, JointAudit, Log, audit};
+use crate::identify::{FitError, Identifiability, Shooting, cut, fit, fit_below};
+use crate::model::{Dynamics, Effect, FittedEffect, Library, Model, Parameter};
+
+/// A declared model, the effects that it may lack, and the logs to learn from, with what follows from them.
+///
+/// Nothing changes it: what a stage finds out is in the copy that it returns. Copies share what is large, the audits, the smoothed
+/// logs and the batches of windows.
+#[derive(Clone)]
+pub struct Problem<'a> {
+    /// With the values in its file.
+    pub declared: &'a Model,
+    /// The effects that it may lack.
+    pub library: &'a Library,
+    pub space: Space,
+    pub settings: &'a Settings,
+    pub logs: &'a [Log],
+    /// One a log, made when it is first asked for.
+    pub(super) audits: Arc<OnceLock<Vec<Audit>>>,
+    /// Speed of each joint over which dry friction reverses, in rad/s (or m/s).
+    pub sign_widths: Vec<f64>,
+    /// Top speed, top torque and largest torque or command in the logs of each joint.
+    pub top_speed: Vec<f64>,
+    pub top_torque: Vec<f64>,
+    pub top_driving: Vec<f64>,
+    pub shooting: Shooting<'a>,
+    /// A few of its windows, spread evenly, for comparing starting points.
+    pub sample: Sample<'a>,
+    /// The free declared parameters at the values that their fit began with, where the model diverges with those in its file;
+    /// else empty.
+    pub moved_to: Vec<Parameter>,
+    /// What the logs determine of the declared parameters.
+    pub identifiability: Identifiability,
+    /// Declared parameters that are held in every fit.
+    pub held: Vec<usize>,
+}
+
+/// Some of a problem's windows.
+#[derive(Clone)]
+pub struct Sample<'a> {
+    pub shooting: Shooting<'a>,
+    /// Which of the problem's windows they are.
+    members: Vec<usize>,
+}
+
+impl<'a> Sample<'a> {
+    pub(super) fn of(shooting: &Shooting<'a>, size: usize) -> Self {
+        let every = shooting.windows.len().div_ceil(size).max(1);
+        let members: Vec<usize> = (0..shooting.windows.len()).step_by(every).collect();
+        let windows = members.iter().map(|&w| shooting.windows[w]).collect();
+        Self {
+            shooting: shooting.over(windows),
+            members,
+        }
+    }
+
+    /// The local values of these windows, of those of all.
+    pub fn locals(&self, all: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        self.members.iter().map(|&w| all[w].clone()).collect()
+    }
+}
+
+impl<'a> Problem<'a> {
+    /// A problem of the motion.
+    pub fn new(
+        declared: &'a Model,
+        library: &'a Library,
+        logs: &'a [Log],
+        settings: &'a Settings,
+    ) -> Self {
+        let audits = logs.iter().map(|log| audit(log, &declared.columns));
+        let audits = audits.collect();
+        Self::audited(declared, library, Space::Motion, (logs, audits), settings)
+    }
+
+    /// A problem of logs with their audits.
+    pub(super) fn audited(
+        declared: &'a Model,
+        library: &'a Library,
+        space: Space,
+        (logs, audits): (&'a [Log], Vec<Audit>),
+        settings: &'a Settings,
+    ) -> Self {
+        let FitSettings {
+            window_s,
+            sample_windows,
+            sign_width_share,
+            ..
+        } = settings.fit;
+        let top = |f: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
+            (0..declared.joints)
+                .map(|j| (0..logs.len()).map(|l| f(l, j)).fold(0.0, f64::max))
+                .collect()
+        };
+        let top_speed = top(&|l, j| audits[l].joints[j].fast_rad_s);
+        let torques: Vec<Vec<Vec<f64>>> =
+            logs.iter().map(|log| declared.drive_torques(log)).collect();
+        let largest = |channel: &[f64]| channel.iter().fold(0.0, |top: f64, x| top.max(x.abs()));
+        let top_torque = top(&|l, j| largest(&torques[l][j]));
+        let top_driving = top(&|l, j| largest(&logs[l].tau[j]));
+        // Encoders that are finer than their noise show it; coarse ones add the error of rounding.
+        let noise = top(&|l, j| {
+            let channel = &audits[l].joints[j].q;
+            channel
+                .noise_std
+                .max(channel.resolution / 12.0_f64.sqrt())
+                .max(1e-9)
+        });
+        let by_speed = || {
+            top_speed
+                .iter()
+                .map(|speed| sign_width_share * speed.max(1e-6))
+                .collect()
+        };
+        let sign_widths: Vec<f64> = declared.sign_width.clone().unwrap_or_else(by_speed);
+        // What a joint's torque owes to other things than the model shows when it is fitted.
+        let noise = match space {
+            Space::Motion => noise,
+            Space::Torque => vec![1.0; declared.joints],
+        };
+        let shooting = space.shooting(logs, cut(logs, window_s), &noise, &sign_widths);
+        let shooting = shooting.near(declared);
+        Self {
+            declared,
+            library,
+            space,
+            settings,
+            logs,
+            audits: Arc::new(audits.into()),
+            sign_widths,
+            sample: Sample::of(&shooting, sample_windows),
+            shooting,
+            top_speed,
+            top_torque,
+            top_driving,
+            moved_to: Vec::new(),
+            identifiability: Identifiability::default(),
+            held: Vec::new(),
+        }
+    }
+
+    /// In how many parts models are judged, see [`Space::parts`].
+    pub(super) fn parts(&self) -> usize {
+        self.space.parts(self.declared.joints)
+    }
+
+    /// The joints in the order of what the logs hold of them: random draws that take them so do not depend on how the
+    /// model numbers them.
+    pub(super) fn joints_by_motion(&self) -> Vec<usize> {
+        let motion = |joint: usize| self.logs.iter().flat_map(move |log| &log.q[joint]);
+        let mut joints: Vec<usize> = (0..self.declared.joints).collect();
+        joints.sort_by(|a, b| by_numbers(motion(*a), motion(*b)));
+        joints
+    }
+
+    /// A share of the loss of one part, as a share of the whole loss.
+    pub(super) fn of_whole(&self, share: f64) -> f64 {
+        share / self.parts() as f64
+    }
+
+    /// The effects that the model may lack.
+    pub(super) fn effects(&self) -> &'a [Effect] {
+        self.library.effects()
+    }
+
+    /// The same model on other logs of the same rig: noise, speeds and the width of friction's reversal stay.
+    pub fn on<'b>(&self, logs: &'b [Log]) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        let windows = cut(logs, self.settings.fit.window_s);
+        let shooting = self
+            .space
+            .shooting(logs, windows, &self.shooting.noise, &self.sign_widths)
+            .near(self.declared);
+        Problem {
+            declared: self.declared,
+            library: self.library,
+            space: self.space,
+            settings: self.settings,
+            logs,
+            audits: Arc::default(),
+            sign_widths: self.sign_widths.clone(),
+            top_speed: self.top_speed.clone(),
+            top_torque: self.top_torque.clone(),
+            top_driving: self.top_driving.clone(),
+            sample: Sample::of(&shooting, self.settings.fit.sample_windows),
+            shooting,
+            moved_to: Vec::new(),
+            identifiability: Identifiability::default(),
+            held: Vec::new(),
+        }
+    }
+
+    /// The same problem over other windows of its logs, or with another noise of its joints.
+    pub(super) fn over(&self, shooting: Shooting<'a>) -> Self {
+        Self {
+            sample: Sample::of(&shooting, self.settings.fit.sample_windows),
+            shooting,
+            ..self.clone()
+        }
+    }
+
+    /// The same problem, of which this is known.
+    pub(super) fn knowing(&self, identifiability: Identifiability) -> Self {
+        Self {
+            identifiability,
+            ..self.clone()
+        }
+    }
+
+    /// The same problem where dry friction reverses over these speeds. Of torques the logs are smoothed with it: they need other
+    /// windows as well.
+    pub(super) fn with_sign_widths(&self, sign_widths: Vec<f64>) -> Self {
+        Self {
+            sign_widths,
+            ..self.clone()
+        }
+    }
+
+    /// Its logs, cut into windows of this length in s.
+    pub(super) fn windows_of(&self, length_s: f64) -> Shooting<'a> {
+        self.shooting.cut_into(length_s)
+    }
+
+    /// The declared model at the values that its fit began with.
+    pub(super) fn started_from(&self) -> Model {
+        let mut model = self.declared.clone();
+        for parameter in &mut model.parameters {
+            let moved = self
+                .moved_to
+                .iter()
+                .find(|moved| moved.name == parameter.name);
+            *parameter = moved.unwrap_or(parameter).clone();
+        }
+        model
+    }
+
+    /// The audits of the logs, in their order.
+    pub fn audits(&self) -> &[Audit] {
+        let of_log = |log| audit(log, &self.declared.columns);
+        self.audits
+            .get_or_init(|| self.logs.iter().map(of_log).collect())
+    }
+
+    /// Whether any joint moves visibly in any of the logs.
+    pub(super) fn moves(&self) -> bool {
+        let moves = |audit: &Audit| audit.joints.iter().any(JointAudit::moves);
+        self.audits().iter().any(moves)
+    }
+
+    /// Fit a model, starting from its values, with the problem's smoothing of friction.
+    ///
+    /// # Errors
+    /// As [`Problem::fit_declared`].
+    pub fn refit(
+        &self,
+        model: &Model,
+        locals: Vec<Vec<f64>>,
+        scale: Option<f64>,
+    ) -> Result<Fitted, FitError> {
+        let model = self.smoothed(model);
+        let dynamics = self.space.compile(&model);
+        let active = self.active(&dynamics);
+        let found = fit(&self.shooting, &dynamics, &active, locals, scale)?;
+        Ok(Fitted::new(&model, &dynamics, found, self.logs))
+    }
+
+    /// Fit a model anew, starting from its values; the scale of its residuals is estimated again.
+    ///
+    /// # Errors
+    /// As [`Problem::fit_declared`].
+    pub fn estimate(&self, fitted: &Fitted) -> Result<Fitted, FitError> {
+        self.refit(&fitted.model, fitted.fit.locals.clone(), None)
+    }
+
+    /// Fit a model with these effects in place of its own, starting from its values, at its scale of the residuals: the
+    /// losses of the two can be compared.
+    ///
+    /// # Errors
+    /// As [`Problem::fit_declared`].
+    pub(super) fn with_effects(
+        &self,
+        fitted: &Fitted,
+        effects: Vec<FittedEffect>,
+    ) -> Result<Fitted, FitError> {
+        let (locals, scale) = (fitted.fit.locals.clone(), fitted.fit.scale);
+        self.refit(&fitted.model.with_effects(effects), locals, Some(scale))
+    }
+
+    /// As [`Problem::with_effects`], where only a loss below `below` is of use: `None` if the model cannot be fitted or does
+    /// not come down to it.
+    pub(super) fn with_better_effects(
+        &self,
+        fitted: &Fitted,
+        effects: Vec<FittedEffect>,
+        below: f64,
+    ) -> Option<Fitted> {
+        let model = self.smoothed(&fitted.model.with_effects(effects));
+        let dynamics = self.space.compile(&model);
+        let (active, locals) = (self.active(&dynamics), fitted.fit.locals.clone());
+        let aim = (fitted.fit.scale, below);
+        let found = fit_below(&self.shooting, &dynamics, &active, locals, aim).ok()??;
+        Some(Fitted::new(&model, &dynamics, found, self.logs))
+    }
+
+    /// The same without the k-th effect of a model.
+    pub(super) fn without_effect(&self, fitted: &Fitted, k: usize) -> Result<Fitted, FitError> {
+        let mut effects = fitted.model.effects.clone();
+        effects.remove(k);
+        self.with_effects(fitted, effects)
+    }
+
+    /// Places of the effects that a model has and the declared model has not.
+    pub fn added(&self, model: &Model) -> Range<usize> {
+        self.declared.effects.len()..model.effects.len()
+    }
+
+    /// A model with the problem's smoothing of friction.
+    pub(super) fn smoothed(&self, model: &Model) -> Model {
+        model.with_sign_widths(self.sign_widths.clone())
+    }
+
+    /// A fitted model with more effects, compiled with the problem's smoothing of friction.
+    pub(super) fn extended(&self, fitted: &Fitted, more: &[FittedEffect]) -> Dynamics {
+        let model = fitted.model.with_effects(fitted.effects_and(more));
+        self.compiled(&model)
+    }
+
+    /// A model compiled for the errors that the problem compares, with its smoothing of friction.
+    pub(super) fn compiled(&self, model: &Model) -> Dynamics {
+        self.space.compile(&self.smoothed(model))
+    }
+
+    /// Whether the logs determine a parameter: other values are not told from one that they do not.
+    pub(super) fn is_told(&self, parameter: usize) -> bool {
+        !self.identifiability.hold.contains(&parameter)
+    }
+
+    /// Parameters that a fit may change.
+    pub fn active(&self, dynamics: &Dynamics) -> Vec<usize> {
+        let free = |k: &usize| !dynamics.parameters[*k].fixed && !self.held.contains(k);
+        (0..dynamics.parameters.len()).filter(free).collect()
+    }
+}

@@ -1,0 +1,132 @@
+use std::fmt::{self, Display, Formatter};
+
+use rayon::prelude::*;
+
+use super::errors::Scorer;
+use crate::closeloop::establish::{Chosen, Standing};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
+use crate::closeloop::refine::Refined;
+use crate::closeloop::select::{Losses, p_of_gains, p_value};
+use crate::digits::amount_of;
+use crate::identify::FitError;
+use crate::model::{FittedEffect, Model, OwnValue, Parameter, Status};
+
+/// One effect that was added.
+#[derive(Debug, Clone)]
+pub struct Finding {
+    pub effect: FittedEffect,
+    pub expression: String,
+    /// With intervals.
+    pub parameters: Vec<Parameter>,
+    /// Of the parameters that switch the effect on; of an effect without such a parameter, of the fall of the loss on
+    /// left-out stretches. 1 where the refit without the effect that this takes fails.
+    pub p_value: f64,
+    /// Share of the compared error on the test logs that this effect alone takes away, or why the refit without it
+    /// failed.
+    pub error_reduction: Result<f64, FitError>,
+    pub status: Status,
+    /// Why it is not established, in a sentence.
+    pub reason: Option<String>,
+}
+
+impl Finding {
+    /// The value of each parameter or, where it has one per log, its values in single logs.
+    pub fn rows(&self) -> Vec<(Parameter, Option<&OwnValue>)> {
+        let of_parameter = |(k, parameter): (usize, &Parameter)| {
+            if !parameter.per_log {
+                return vec![(parameter.clone(), None)];
+            }
+            let own = self.effect.own.iter().filter(|own| own.parameter == k);
+            own.map(|own| {
+                let parameter = Parameter {
+                    value: own.value,
+                    ci95: own.ci95,
+                    ..parameter.clone()
+                };
+                (parameter, Some(own))
+            })
+            .collect()
+        };
+        let all = self.parameters.iter().enumerate();
+        all.flat_map(of_parameter).collect()
+    }
+}
+
+/// `coulomb_friction on joint 1: F_c1 = 0.1598 N m (0.1593 to 0.1603)`
+impl Display for Finding {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let values: Vec<String> = self.rows().iter().map(own_value).collect();
+        write!(f, "{}: {}", self.effect.label(), values.join(", "))
+    }
+}
+
+/// A value of a finding, with the log where it holds in one alone.
+fn own_value((parameter, own): &(Parameter, Option<&OwnValue>)) -> String {
+    let amount = amount_of(parameter.value, parameter.ci95, &parameter.unit);
+    let log = own.map_or_else(String::new, |own| format!(" in {}", own.log_name()));
+    format!("{} = {amount}{log}", parameter.name)
+}
+
+/// The effects that were added to the declared model, each with what it contributes. `chosen` is the model before it was
+/// refined, `with` the error of the refined one on the test logs.
+pub(in crate::closeloop) fn findings(
+    problem: &Problem<'_>,
+    chosen: &Chosen,
+    refined: &Refined<'_>,
+    scorer: &Scorer<'_>,
+) -> Vec<Finding> {
+    let (chosen, standings) = (&chosen.after, &chosen.standings);
+    let with = scorer.compared(problem.space, chosen);
+    let added = problem.added(&refined.after.model);
+    let finding = |(k, standing): (usize, &Standing)| {
+        // Both as effects were selected, in coarse steps.
+        let less = &standing.without;
+        let error = |less: &Fitted| scorer.compared(problem.space, less);
+        let reduction = |less: &Fitted| 1.0 - with / error(less).max(f64::MIN_POSITIVE);
+        let (expression, parameters) = described(problem.declared, &refined.after.model, k);
+        Finding {
+            effect: refined.after.model.effects[k].clone(),
+            expression,
+            parameters,
+            p_value: p_value(&refined.problem, &refined.after, k)
+                .or_else(|| {
+                    let effect = &standing.effect;
+                    Some(p_of_refit(problem, chosen, less.as_ref().ok()?, effect))
+                })
+                .unwrap_or(1.0),
+            error_reduction: less.as_ref().map(reduction).map_err(Clone::clone),
+            status: standing.status,
+            reason: standing.reason.clone(),
+        }
+    };
+    added.into_par_iter().zip(standings).map(finding).collect()
+}
+
+/// The signed-rank p-value of a model beside the refit without one of its effects.
+fn p_of_refit(
+    problem: &Problem<'_>,
+    chosen: &Fitted,
+    without: &Fitted,
+    effect: &FittedEffect,
+) -> f64 {
+    let losses = |model: &Fitted| Losses::of(problem, model).of_effect(effect);
+    p_of_gains(&losses(without), &losses(chosen))
+}
+
+/// What the k-th effect of a model adds, and the parameters that it is reported with: of a shift, what is shifted.
+fn described(declared: &Model, model: &Model, k: usize) -> (String, Vec<Parameter>) {
+    let effect = &model.effects[k];
+    match effect.shifted() {
+        Some(shifted) => {
+            let actual = model.absorbed().parameters.swap_remove(shifted);
+            let expression = declared.parameters[shifted].expression_of_shift(actual.value);
+            (expression, vec![actual])
+        }
+        None => {
+            let own = model.all_parameters()[model.place_of(k)].to_vec();
+            let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
+            (effect.expression(&names, model.driven_by()), own)
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! Sets are compared before they are fitted, on a simulated pendulum with dry friction.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::blocks::{blocks, usual_friction};
+use super::candidate::candidates;
+use super::exchange::{Exchange, exchanges};
+use super::folds::{Folds, left_out_losses, predicted};
+use super::outlook::Outlook;
+use super::simpler::{mended, simpler};
+use super::trial::Trial;
+use crate::closeloop::fit::{Declared, NOTHING};
+use crate::closeloop::problem::Problem;
+use crate::closeloop::settings::Settings;
+use crate::closeloop::tests::{absent, logs, pendulum, recorded};
+use crate::model::{FittedEffect, Library};
+
+#[test]
+fn what_is_left_out_together_is_a_connected_part_of_one_log() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let problem = Problem::new(&declared, &NOTHING, &logs, &settings);
+    let folds = Folds::of(&problem);
+    assert!(folds.groups.is_sorted(), "{:?}", folds.groups);
+    let mut logs_of = std::collections::HashMap::new();
+    for (window, &stretch) in problem.shooting.windows.iter().zip(&folds.stretches) {
+        let log = logs_of.entry(folds.groups[stretch]).or_insert(window.log);
+        assert_eq!(*log, window.log);
+    }
+    assert!(logs_of.len() >= settings.select.fewest_groups);
+}
+
+#[test]
+fn a_loss_far_below_zero_is_rounding_and_no_loss() {
+    let one = |value: f64| DVector::from_element(1, value);
+    let curved = DMatrix::from_element(1, 1, 2.0);
+    assert_eq!(predicted(3.0, &one(2.0), &curved, &one(-1.0)), 2.0);
+    assert_eq!(predicted(1.0, &one(2.0), &curved, &one(-1.0)), 0.0);
+    let flat = DMatrix::zeros(1, 1);
+    let lost = predicted(3.0, &one(-1e-8), &flat, &one(1e12));
+    assert_eq!(lost, f64::INFINITY);
+}
+
+#[test]
+fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let library = Library::built_in();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let all = candidates(&problem, &[]);
+    let outlook = Outlook::of(&problem, &fitted, &all).unwrap();
+    let loss = |set: &[usize]| outlook.losses(set).unwrap().iter().sum::<f64>();
+    let known: f64 = left_out_losses(&problem, &fitted.fit).iter().sum();
+    assert!((loss(&[]) / known - 1.0).abs() < 0.01);
+
+    let items = outlook.items.iter().map(FittedEffect::label);
+    let coulomb = items
+        .clone()
+        .position(|label| label.starts_with("coulomb"))
+        .unwrap();
+    let effects = outlook.effects(&[coulomb]);
+    let with = problem.with_effects(&fitted, effects).unwrap();
+    let found: f64 = left_out_losses(&problem, &with.fit).iter().sum();
+    assert!(found < 0.2 * known);
+    assert!(
+        loss(&[coulomb]) < 0.3 * known,
+        "{} {found} {known}",
+        loss(&[coulomb])
+    );
+}
+
+/// A disc that is off its axis by its whole bound was not found there.
+#[test]
+fn a_set_with_a_value_at_its_bound_is_not_valid() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let library = Library::built_in();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let effects = vec![absent("coulomb_friction"), absent("encoder_eccentricity")];
+    let fitted = problem.with_effects(&fitted, effects).unwrap();
+    let mut trial = Trial::of(&problem, fitted);
+    assert!(trial.is_valid(&problem));
+    let disc = &mut trial.fitted.model.effects[1];
+    disc.values[0].0 = disc.effect.parameters[0].bounds[1];
+    assert!(!trial.is_valid(&problem));
+}
+
+/// A library of one's own, whatever its effects are called, says what most machines have.
+#[test]
+fn what_most_machines_have_is_said_by_effect_files() {
+    let drag = |name: &str, rank: &str| {
+        let effect = format!(
+            "[effect]\nname = \"{name}\"\nabout = \"drag\"\nforce = \"-c * qd\"\n{rank}\n\
+             [parameters]\nc = {{ unit = \"N m s/rad\", typical = 1 }}\n"
+        );
+        effect.parse().unwrap()
+    };
+    let library = Library::empty()
+        .with_effect(drag("bearing", "baseline = 3"))
+        .with_effect(drag("grease", "baseline = 1"))
+        .with_effect(drag("magnet", ""));
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let names = |set: &Vec<FittedEffect>| -> Vec<String> {
+        set.iter()
+            .map(|effect| effect.effect.name.clone())
+            .collect()
+    };
+    let sets: Vec<_> = blocks(&problem).iter().map(names).collect();
+    assert_eq!(sets, [vec!["grease"], vec!["bearing", "grease"]]);
+    assert_eq!(names(&usual_friction(&problem)), ["grease"]);
+}
+
+/// Its fastest possible velocity says that friction does not fall: it is Coulomb friction at the level found.
+#[test]
+fn an_effect_at_a_bound_gives_way_to_what_it_contains() {
+    let library = Library::built_in();
+    let mut stribeck = absent("stribeck_friction");
+    let fastest = stribeck.effect.parameters[2].bounds[1];
+    stribeck.values = vec![(0.1, None), (0.2, None), (fastest, None)];
+    let set = [absent("joint_spring"), stribeck];
+    let mended = mended(library.effects(), &[], &set);
+    let labels: Vec<String> = mended.iter().map(FittedEffect::label).collect();
+    assert_eq!(
+        labels,
+        ["joint_spring on joint 1", "coulomb_friction on joint 1"]
+    );
+    assert_eq!(mended[1].values[0].0, 0.1);
+}
+
+/// A gain of the torque beside a free inertia has any value.
+#[test]
+fn a_set_whose_values_the_logs_do_not_tell_apart_is_not_valid() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let library = Library::built_in();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let is_valid = |names: &[&str]| {
+        let effects = names.iter().map(|name| absent(name)).collect();
+        let fitted = problem.with_effects(&fitted, effects).unwrap();
+        Trial::of(&problem, fitted).is_valid(&problem)
+    };
+    assert!(is_valid(&["coulomb_friction"]));
+    assert!(!is_valid(&["coulomb_friction", "actuator_gain"]));
+}
+
+#[test]
+fn simpler_sets_have_fewer_parameters() {
+    let library = Library::built_in();
+    let sets = simpler(library.effects(), &[absent("asymmetric_friction")], 0..1);
+    let mut most: Vec<&str> = (sets.last().unwrap().iter())
+        .map(|effect| &*effect.effect.name)
+        .collect();
+    most.sort_unstable();
+    let parts = ["constant_torque", "coulomb_friction", "viscous_friction"];
+    assert_eq!(most, parts);
+}
+
+/// The friction that a file declares is not added to it once more: no file may hold it twice.
+#[test]
+fn simpler_sets_hold_no_effect_twice() {
+    let library = Library::built_in();
+    let effects = ["viscous_friction", "asymmetric_friction"].map(absent);
+    let sets = simpler(library.effects(), &effects, 1..2);
+    let is_twice = |set: &Vec<FittedEffect>| {
+        let again = |effect: &FittedEffect| effect.is_same(&effects[0]);
+        set.iter().filter(|effect| again(effect)).count() > 1
+    };
+    assert!(!sets.is_empty() && !sets.iter().any(is_twice));
+    let [declared, whole] = effects;
+    let mut broken = whole;
+    broken.values[0].0 = f64::NAN;
+    let mended = mended(library.effects(), &[declared], &[broken]);
+    let names: Vec<&str> = mended.iter().map(|effect| &*effect.effect.name).collect();
+    assert!(!names.contains(&"viscous_friction"), "{names:?}");
+}
+
+/// The lag takes over the value of the delay, and the ripple is tried with the number of periods that the rig has and
+/// with those next to its own.
+#[test]
+fn exchanges_start_near_what_they_replace() {
+    const RIG: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 200, position_noise = 2e-4, position_step = 0.0 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 3.0], tones = 10 }
+recording = { logs = 3, duration_s = 6, start = [0, 0] }
+effect = [
+    { name = "actuator_lag", joint = 1, T = 0.03 },
+    { name = "cogging_torque", joint = 1, A = 0.3, N = 7, phase = 0.4 },
+]
+"#;
+    let (declared, logs, settings) = (pendulum(), recorded(RIG, 0), Settings::default());
+    let library = Library::built_in();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let mut ripple = absent("cogging_torque");
+    ripple.values = vec![(0.1, None), (6.0, None), (0.4, None)];
+    let set = vec![absent("actuator_delay"), ripple];
+    let wrong = problem.with_effects(&fitted, set).unwrap();
+    let delay = wrong.model.effects[0].values[0].0;
+    assert!(delay > 0.01);
+    let all = exchanges(&problem, &wrong);
+    for number in [5.0, 7.0] {
+        let mut ripple = wrong.model.effects[1].clone();
+        ripple.values[1].0 = number;
+        let is_tried = |exchange: &Exchange| exchange.pair[1] == problem.id(&ripple);
+        assert!(all.iter().any(is_tried), "{number}");
+    }
+    let lag = all.iter().flat_map(|exchange| &exchange.set);
+    let lag = lag.filter(|effect| effect.effect.name == "actuator_lag");
+    assert_eq!(lag.map(|lag| lag.values[0].0).collect::<Vec<_>>(), [delay]);
+}

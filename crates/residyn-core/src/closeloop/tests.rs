@@ -1,0 +1,572 @@
+//! Failures are carried to the report, and settings are heard, on a simulated pendulum with dry friction.
+
+use std::path::Path;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::establish::{Chosen, Standing, establish};
+use super::fit::{Declared, NOTHING};
+use super::fitted::Fitted;
+use super::judge::Found;
+use super::pipeline::{close_loop, find};
+use super::problem::Problem;
+use super::refine::refined;
+use super::remainder::ResidualForce;
+use super::request::Request;
+use super::score::{Scored, Scorer, findings};
+use super::select::{Selected, Trial, select, select_from};
+use super::settings::Settings;
+use super::split::Split;
+use super::stage::{Progress, Watch};
+use super::verdict::{Verdict, verdict};
+use crate::data::{Audit, Joint, Log};
+use crate::identify::{FitError, Termination};
+use crate::model::{FittedEffect, Library, Model, Status};
+use crate::plant::Plant;
+
+const RIG: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
+recording = { logs = 3, duration_s = 8, start = [0, 0] }
+effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.2 }]
+"#;
+
+/// The logs of a rig of this file.
+pub(super) fn recorded(rig: &str, seed: u64) -> Vec<Log> {
+    let library = Library::built_in();
+    let model = |name: &Path| library.model(name.to_str().unwrap());
+    let plant = Plant::from_text(Path::new("rig.toml"), rig, &library, model).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..plant.recording.logs)
+        .map(|_| plant.record(&mut rng).unwrap())
+        .collect()
+}
+
+/// Of a pendulum with dry friction.
+pub(super) fn logs() -> Vec<Log> {
+    recorded(RIG, 0)
+}
+
+pub(super) fn pendulum() -> Model {
+    Library::built_in().model("pendulum").unwrap()
+}
+
+/// An effect of the library on the first joint, at its values where it is absent.
+pub(super) fn absent(name: &str) -> FittedEffect {
+    let library = Library::built_in();
+    FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0))
+}
+
+/// A model that moves no window: its values are no numbers.
+fn diverging(mut fitted: Fitted) -> Fitted {
+    for parameter in &mut fitted.model.parameters {
+        parameter.value = f64::NAN;
+    }
+    fitted
+}
+
+fn search<'a>(problem: &Problem<'a>) -> Found<'a> {
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    find(problem.fit_declared().unwrap(), &[], &mut rng, &()).unwrap()
+}
+
+/// A problem in which nothing can be found.
+fn closed<'a>(declared: &'a Model, logs: &'a [Log], settings: &'a Settings) -> Problem<'a> {
+    Problem::new(declared, &NOTHING, logs, settings)
+}
+
+#[test]
+fn a_model_that_diverges_has_no_residual_force() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let problem = closed(&declared, &logs, &settings);
+    let model = problem.fit_declared().unwrap().fitted;
+    assert!(ResidualForce::of(&problem, &model).unwrap().norm() > 0.0);
+    let failed = ResidualForce::of(&problem, &diverging(model));
+    assert!(matches!(failed, Err(FitError::Diverged { .. })));
+}
+
+/// Of two effects the rig has one; what the other takes away is noise.
+#[test]
+fn an_effect_that_saves_little_is_not_established() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let library = Library::built_in();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let start = declared.with_effects(["coulomb_friction", "gravity_tilt"].map(absent).into());
+    let fitted = problem
+        .refit(&start, problem.shooting.initial_locals(0), None)
+        .unwrap();
+    let selected = Selected {
+        chosen: Ok(Trial::of(&problem, fitted.clone())),
+        rounds: Vec::new(),
+        stopped: false,
+    };
+    let standings = establish(&problem, &fitted, selected, &()).standings;
+    let statuses: Vec<Status> = standings.iter().map(|s| s.status).collect();
+    assert_eq!(statuses, [Status::Established, Status::Supported]);
+    assert!(standings[0].reason.is_none());
+    assert!(
+        standings[1]
+            .reason
+            .as_ref()
+            .unwrap()
+            .contains("the loss on left-out stretches by")
+    );
+}
+
+#[test]
+fn a_fit_that_fails_allows_no_verdict() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let (split, library) = (Split::of(logs, &settings.split), Library::built_in());
+    let problem = Problem::new(&declared, &library, &split.train, &settings);
+    let mut found = search(&problem);
+    let scorer = Scorer {
+        test: &split.test,
+        settings: &settings.score,
+    };
+    let finer = refined(&found.problem, &found.before, &found.chosen.after);
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let models = Scored {
+        space: problem.space,
+        declared: &declared,
+        before: &finer.before,
+        with_friction: None,
+        after: &finer.after,
+        hybrid: None,
+        against: &[],
+    };
+    let errors = scorer.errors(models, &mut rng);
+    let of = |found: &Found<'_>, refined: &_| verdict(found, refined, &errors);
+    assert_eq!(of(&found, &finer).0, Verdict::Explained);
+
+    let mut failed = refined(
+        &found.problem,
+        &found.before,
+        &diverging(found.chosen.after.clone()),
+    );
+    assert!(matches!(failed.failure, Some(FitError::Diverged { .. })));
+    failed.after = finer.after.clone();
+    let (answer, reason) = of(&found, &failed);
+    assert_eq!(answer, Verdict::Inconclusive);
+    assert!(reason.contains("the final fit in fine steps failed"));
+
+    let mut unfinished = refined(&found.problem, &found.before, &found.chosen.after);
+    unfinished.after.fit.termination = Termination::StepLimit;
+    let (answer, reason) = of(&found, &unfinished);
+    assert_eq!(answer, Verdict::Inconclusive);
+    assert!(reason.contains("not converged"), "{reason}");
+
+    found.chosen.failure = failed.failure.clone();
+    assert_eq!(of(&found, &finer).0, Verdict::Inconclusive);
+}
+
+/// Where a rig's torque carries a bias, the model without the effect that takes it away leaves the range in which its
+/// equations hold.
+#[test]
+fn an_effect_stays_where_the_refit_without_it_fails() {
+    let bounded = "sin(q1) * (1 + 1e-9*sqrt(3.6 - abs(q1)))";
+    let text = pendulum().declaration.replace("sin(q1)", bounded);
+    let declared = Model::from_text(Path::new("rig.toml"), &text, &[]).unwrap();
+    let (mut logs, settings) = (logs(), Settings::default());
+    for tau in logs.iter_mut().flat_map(|log| &mut log.tau[0]) {
+        *tau += 8.0;
+    }
+    let (split, library) = (Split::of(logs, &settings.split), Library::built_in());
+    let problem = Problem::new(&declared, &library, &split.train, &settings);
+    let bias = |size: f64| FittedEffect {
+        values: vec![(size, None)],
+        ..absent("constant_torque")
+    };
+    let mut start = declared.with_effects(vec![bias(-8.0)]);
+    for (parameter, value) in start.parameters.iter_mut().zip([-17.4, 4.6]) {
+        parameter.value = value;
+    }
+    let locals = problem.shooting.initial_locals(0);
+    let chosen = problem.refit(&start, locals, None).unwrap();
+    let refined = refined(&problem, &chosen, &chosen);
+    let scorer = Scorer {
+        test: &split.test,
+        settings: &settings.score,
+    };
+    let standing = Standing {
+        effect: chosen.model.effects[0].clone(),
+        status: Status::Established,
+        gain: 1.0,
+        p_value: 0.0,
+        reason: None,
+        without: problem.without_effect(&chosen, 0),
+    };
+    let chosen = Chosen {
+        after: chosen,
+        standings: vec![standing],
+        rounds: Vec::new(),
+        stopped: false,
+        rivals: Vec::new(),
+        failure: None,
+    };
+    let found = findings(&problem, &chosen, &refined, &scorer);
+    assert_eq!(found.len(), 1);
+    assert!(matches!(
+        found[0].error_reduction,
+        Err(FitError::Diverged { .. })
+    ));
+    assert!(found[0].p_value < 1e-6);
+}
+
+#[test]
+fn the_error_reduction_compares_two_fits_in_the_same_steps() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let (split, library) = (Split::of(logs, &settings.split), Library::built_in());
+    let problem = Problem::new(&declared, &library, &split.train, &settings);
+    let found = search(&problem);
+    let finer = refined(&found.problem, &found.before, &found.chosen.after);
+    let scorer = Scorer {
+        test: &split.test,
+        settings: &settings.score,
+    };
+    let reported = findings(&problem, &found.chosen, &finer, &scorer);
+    let reduction = *reported[0].error_reduction.as_ref().unwrap();
+    let after = &found.chosen.after;
+    let (locals, scale) = (after.fit.locals.clone(), after.fit.scale);
+    let less = after.model.with_effects(Vec::new());
+    let less = problem.refit(&less, locals, Some(scale)).unwrap();
+    let error = |model: &Fitted| scorer.fitted(model).position_rms();
+    assert_eq!(reduction, 1.0 - error(after) / error(&less));
+}
+
+/// No single effect helps much where both joints have friction: the four are found together.
+#[test]
+fn friction_of_all_joints_is_found_at_once() {
+    const RIG: &str = r#"
+model = "acrobot"
+parameters = { m1 = 0.6, m2 = 0.6, l1 = 0.3, lc1 = 0.25, lc2 = 0.2, I1 = 0.02, I2 = 0.01 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [1.5, 0.8], band_hz = [0.2, 2.0], tones = 8 }
+recording = { logs = 4, duration_s = 8, start = [0, 0, 0, 0] }
+effect = [
+    { name = "coulomb_friction", joint = 1, F_c = 0.15 },
+    { name = "viscous_friction", joint = 1, b = 0.04 },
+    { name = "coulomb_friction", joint = 2, F_c = 0.1 },
+    { name = "viscous_friction", joint = 2, b = 0.03 },
+]
+"#;
+    let library = Library::built_in();
+    let logs = recorded(RIG, 0);
+    let (declared, settings) = (library.model("acrobot").unwrap(), Settings::default());
+    let found = search(&Problem::new(&declared, &library, &logs, &settings));
+    let established = found
+        .chosen
+        .standings
+        .iter()
+        .filter(|s| s.status == Status::Established);
+    let mut names: Vec<String> = established.map(|s| s.effect.label()).collect();
+    names.sort();
+    let of = |name: &str| [1, 2].map(|joint| format!("{name} on joint {joint}"));
+    assert_eq!(
+        names,
+        [of("coulomb_friction"), of("viscous_friction")].concat()
+    );
+}
+
+/// Where the test logs contradict the effects, something is missing if a remainder stays; else more must be known.
+#[test]
+fn effects_that_raise_the_error_on_the_test_logs_are_doubted() {
+    let (declared, library) = (pendulum(), Library::built_in());
+    let outcome = |significance: f64| {
+        let mut request = Request::of(&declared, &library, logs());
+        // Every effect counts as worse, and every remainder as noteworthy.
+        request.settings.verdict.trusted_rise = 0.0;
+        request.settings.establish.masking_share = f64::INFINITY;
+        request.settings.establish.outweighed_share = 0.0;
+        let remainder = &mut request.settings.remainder;
+        (remainder.noteworthy_share, remainder.unlocated_share) = (-1.0, -1.0);
+        remainder.significance = significance;
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        close_loop(request, &mut rng, &()).unwrap()
+    };
+    let missing = outcome(2.0);
+    assert_eq!(missing.verdict, Verdict::PartlyExplained);
+    assert!(
+        missing.reason.contains("raise the error"),
+        "{}",
+        missing.reason
+    );
+    let nothing_missing = outcome(0.0);
+    assert_eq!(nothing_missing.verdict, Verdict::Inconclusive);
+}
+
+/// An effect beside a remainder that outweighs it may be a part of the real cause's shape.
+#[test]
+fn an_effect_that_a_remainder_outweighs_is_not_established() {
+    let (declared, library) = (pendulum(), Library::built_in());
+    let mut request = Request::of(&declared, &library, logs());
+    let remainder = &mut request.settings.remainder;
+    (remainder.noteworthy_share, remainder.unlocated_share) = (-1.0, -1.0);
+    remainder.significance = 2.0;
+    request.settings.establish.outweighed_share = f64::INFINITY;
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let outcome = close_loop(request, &mut rng, &()).unwrap();
+    assert!(outcome.effects.findings.is_empty());
+    let reason = outcome.effects.supported[0].reason.as_ref().unwrap();
+    assert!(reason.contains("stays unexplained"), "{reason}");
+    assert_eq!(outcome.verdict, Verdict::Unexplained);
+}
+
+/// Whoever watches may end the search before it has tried anything; the report says so.
+#[test]
+fn a_search_that_is_ended_allows_no_verdict() {
+    struct Ended;
+    impl Watch for Ended {
+        fn see(&self, _: Progress<'_>) {}
+
+        fn has_to_end(&self) -> bool {
+            true
+        }
+    }
+    let (declared, library) = (pendulum(), Library::built_in());
+    let request = Request::of(&declared, &library, logs());
+    let outcome = close_loop(request, &mut ChaCha8Rng::seed_from_u64(0), &Ended).unwrap();
+    assert!(outcome.effects.stopped && outcome.effects.rounds.iter().all(|r| r.tried.is_empty()));
+    assert_eq!(outcome.verdict, Verdict::Inconclusive);
+}
+
+/// The model is the same before and after, and so is its error.
+#[test]
+fn without_effects_the_error_reduction_is_zero() {
+    let (declared, library) = (pendulum(), Library::built_in());
+    let mut request = Request::of(&declared, &library, logs());
+    request.settings.select.most_effects = 0;
+    request.settings.select.most_effects_per_joint = 0;
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let outcome = close_loop(request, &mut rng, &()).unwrap();
+    assert!(outcome.effects.findings.is_empty());
+    assert_eq!(outcome.errors.reduction_ci95, Some([0.0, 0.0]));
+}
+
+#[test]
+fn a_changed_setting_changes_the_search() {
+    let (declared, library, logs) = (pendulum(), Library::built_in(), logs());
+    let named = |settings: &Settings| {
+        search(&Problem::new(&declared, &library, &logs, settings))
+            .chosen
+            .after
+            .model
+            .effects
+            .len()
+    };
+    let mut settings = Settings::default();
+    assert_eq!(named(&settings), 1);
+    settings.select.most_effects = 0;
+    settings.select.most_effects_per_joint = 0;
+    assert_eq!(named(&settings), 0);
+}
+
+#[test]
+fn a_search_that_begins_over_short_windows_ends_with_the_same_effects() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let library = Library::built_in();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let short = problem.fitted_over_short_windows().unwrap();
+    let problem = problem.knowing(short.problem.identifiability.clone());
+    assert!(short.problem.shooting.windows.len() > 2 * problem.shooting.windows.len());
+    let long = select(&problem, &fitted, &()).chosen.unwrap();
+    let both = select_from(&problem, &short, &()).chosen.unwrap();
+    let effects = &long.fitted.model.effects;
+    assert_eq!(effects.len(), 1);
+    assert!(effects[0].is_same(&absent("coulomb_friction")));
+    assert_eq!(both.key(), long.key());
+    let loss = |trial: &Trial| trial.loss() * trial.fitted.fit.scale.powi(2);
+    assert!((loss(&both) / loss(&long) - 1.0).abs() < 1e-3);
+}
+
+/// Torques that change from row to row, of which the logger dropped some: what the rig did then nobody knows.
+#[test]
+fn windows_with_dropped_rows_do_not_count_as_unexplained() {
+    const ROUGH: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 15.0], tones = 30 }
+recording = { logs = 3, duration_s = 8, start = [0, 0] }
+"#;
+    let with_dropped = |mut log: Log| {
+        let kept = |row: &usize| *row > 500 || row % 20 != 7;
+        let of = |column: &[f64]| {
+            (0..column.len())
+                .filter(kept)
+                .map(|row| column[row])
+                .collect()
+        };
+        log.q = log.q.iter().map(|column| of(column)).collect();
+        log.qd = log.qd.iter().map(|column| of(column)).collect();
+        log.tau = log.tau.iter().map(|column| of(column)).collect();
+        log.time = of(&log.time);
+        log.for_fits(0.5)
+    };
+    let (declared, settings) = (pendulum(), Settings::default());
+    let library = Library::built_in();
+    let mut logs: Vec<Log> = recorded(ROUGH, 0).into_iter().map(with_dropped).collect();
+    let found = |logs: &[Log]| {
+        let problem = Problem::new(&declared, &library, logs, &settings);
+        search(&problem).unexplained
+    };
+    let left = found(&logs);
+    assert!(!left.is_significant(), "{left:?}");
+    assert!((1..30).contains(&left.omnibus.windows), "{left:?}");
+    for log in &mut logs {
+        assert_eq!(log.filled.len(), 25);
+        log.masked = vec![std::mem::take(&mut log.filled)];
+    }
+    assert!(found(&logs).is_significant(), "were they counted");
+}
+
+/// An inertia a fifth of the rig's and a moment five times as large make the mass matrix indefinite.
+#[test]
+fn starting_values_with_which_the_model_diverges_are_moved() {
+    const RIG: &str = r#"
+model = "acrobot"
+parameters = { m1 = 0.6, m2 = 0.6, l1 = 0.2, lc1 = 0.2, lc2 = 0.2, I1 = 0.02, I2 = 0.01 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [1.0, 0.5], band_hz = [0.2, 2.0], tones = 8 }
+recording = { logs = 2, duration_s = 6, start = [0, 0, 0, 0] }
+"#;
+    let text = include_str!("../../../../docs/rigs/dfki_double_pendulum.toml");
+    let read = |text: &str| Model::from_text(Path::new("two_links.toml"), text, &[]).unwrap();
+    let far = text
+        .replace("{ value = 0.03,", "{ value = 0.006,")
+        .replace("{ value = 0.15,", "{ value = 0.75,");
+    let (near, far) = (read(text), read(&far));
+    let (logs, settings) = (recorded(RIG, 0), Settings::default());
+    let fitted = |model: &Model| {
+        let found = closed(model, &logs, &settings).fit_declared().unwrap();
+        (found.fitted.model.values(), found.problem.moved_to)
+    };
+    let (wanted, unmoved) = fitted(&near);
+    let (found, moved_to) = fitted(&far);
+    assert!(unmoved.is_empty());
+    assert!(moved_to.iter().any(|p| p.name == "s2" && p.value < 0.7));
+    for (found, wanted) in found.iter().zip(&wanted) {
+        assert!((found / wanted - 1.0).abs() < 1e-3, "{found} {wanted}");
+    }
+}
+
+/// Three parameters of which the motion tells two combinations, inertia about the pivot and weight. A fit that begins at other
+/// values that explain the logs comes back to the nearest to the declared ones.
+#[test]
+fn what_the_logs_do_not_determine_stays_near_the_declared_values() {
+    const RIG: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
+recording = { logs = 3, duration_s = 8, start = [0, 0] }
+effect = []
+"#;
+    const FILE: &str = r#"
+[system]
+name = "rod"
+joints = 1
+[parameters]
+m = { value = 1.0, positive = true }
+l = { value = 0.5, positive = true }
+I = { value = 0.1, positive = true }
+[dynamics]
+qdd1 = "(tau1 - 9.81 * m * l * sin(q1)) / (I + m * l^2)"
+"#;
+    let declared = Model::from_text(Path::new("rod.toml"), FILE, &[]).unwrap();
+    let (logs, settings) = (recorded(RIG, 0), Settings::default());
+    let problem = closed(&declared, &logs, &settings);
+    let (inertia, moment) = (1.0 / 4.6, 17.4 / 4.6 / 9.81);
+    let mut start = declared.clone();
+    let far = [2.0, moment / 2.0, inertia - moment * moment / 2.0];
+    for (parameter, value) in start.parameters.iter_mut().zip(far) {
+        parameter.value = value;
+    }
+    let locals = problem.shooting.initial_locals(0);
+    let fitted = problem.refit(&start, locals, None).unwrap();
+    let [m, l, i] = fitted.model.values()[..] else {
+        panic!()
+    };
+    assert!((m * l / moment - 1.0).abs() < 0.01, "{m} {l}");
+    assert!(((i + m * l * l) / inertia - 1.0).abs() < 0.01, "{i}");
+    assert!((0.7..1.3).contains(&m), "{m}");
+    assert_eq!(problem.identifiability_of(&fitted).determined, 2);
+}
+
+/// Without torque nothing tells inertia from friction: what is declared of the inertia is held, so that the friction of the
+/// file gets a value.
+#[test]
+fn what_an_effect_of_the_file_is_not_told_from_is_held() {
+    const RIG: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [0.0], band_hz = [0.15, 2.0], tones = 8 }
+recording = { logs = 2, duration_s = 8, start = [2.0, 0] }
+effect = [{ name = "viscous_friction", joint = 1, b = 0.1 }]
+"#;
+    let (mut declared, library) = (pendulum(), Library::built_in());
+    declared.parameters[0].value = -15.0;
+    let declared = declared.with_effects(vec![absent("viscous_friction")]);
+    let (logs, settings) = (recorded(RIG, 0), Settings::default());
+    // Coulomb friction is fitted beside it at first, and counts for nothing.
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    assert_eq!(problem.identifiability.hold, [1]);
+    assert_eq!(problem.identifiability.free, 3);
+    let [_, c_i, b] = fitted.model.values()[..] else {
+        panic!()
+    };
+    assert!((c_i * b - 0.46).abs() < 0.01, "{c_i} {b}");
+}
+
+#[test]
+fn a_result_predicts_a_log() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let found = closed(&declared, &logs, &settings).fit_declared().unwrap();
+    let predicted = found.fitted.predict(&logs[0], 0.5);
+    assert!(predicted.len() > 10);
+}
+
+/// Two joints whose torques are logged as the model means them, or the other way round.
+#[test]
+fn torques_that_are_reversed_on_all_joints_are_told() {
+    let rig = r#"
+model = "acrobot"
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [8.0, 4.0], band_hz = [0.2, 2.0], tones = 8 }
+recording = { logs = 1, duration_s = 6, start = [0, 0, 0, 0] }
+effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.5 }]
+"#;
+    let library = Library::built_in();
+    let declared = library.model("acrobot").unwrap();
+    let settings = Settings::default();
+    let told = |problem: &Problem<'_>, mut audits: Vec<Audit>| -> Vec<String> {
+        let usual = problem.with_usual_friction();
+        problem.tell_reversed(usual.as_ref(), &mut audits);
+        let texts = audits[0].serious().map(ToString::to_string);
+        texts
+            .filter(|text| text.contains("with every tau reversed"))
+            .collect()
+    };
+    let blank = |problem: &Problem<'_>| {
+        let mut audits = problem.audits().to_vec();
+        audits[0].findings.clear();
+        audits
+    };
+    let mut logs = recorded(rig, 0);
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    assert!(told(&problem, blank(&problem)).is_empty());
+    for value in logs[0].tau.iter_mut().flatten() {
+        *value = -*value;
+    }
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let alone = told(&problem, blank(&problem));
+    assert_eq!(alone.len(), 1);
+    assert!(alone[0].contains("[columns] tau = "), "{}", alone[0]);
+    // Where the audit of the log says so of each joint, there is nothing to add.
+    assert!(told(&problem, problem.audits().to_vec()).is_empty());
+}

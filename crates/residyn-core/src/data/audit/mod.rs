@@ -1,0 +1,205 @@
+//! What a log is good for: units, signs, sampling, noise, jumps, lags and excitation, measured before any fit.
+//!
+//! The audit reads the log alone and no model but for the names of its columns. It changes nothing: what it finds is
+//! told, and the fit decides. Intervals that are left out are read like all others.
+
+mod channel;
+mod compare;
+mod demand;
+mod findings;
+mod joint;
+mod misread;
+mod motion;
+mod quality;
+mod regressors;
+mod repeats;
+mod response;
+mod rest;
+mod stretches;
+mod table;
+
+pub use channel::Channel;
+pub use compare::{MAX_LAG_S, TorqueLag, VelocityCheck};
+pub use demand::TorqueDemand;
+pub use joint::JointAudit;
+pub(crate) use misread::reversed_driving;
+pub use quality::{Audit, Finding, Remedy, Severity};
+pub use repeats::{Repeated, tell_repeats};
+pub use response::Response;
+
+use std::ops::Range;
+
+use super::columns::Columns;
+use super::dropped::{dropped, is_gap};
+use super::examined::examined;
+use super::log::{Interval, Log};
+use super::signal::differences;
+use super::statistics::{deviation, median};
+
+/// Measures the quality of a log that was read from these columns.
+///
+/// The numbers are those of the log as it was read. Where columns hold something else than was asked for, the first
+/// findings say so, and the others are about the log as it is meant.
+///
+/// Works on any log that [`Log::of_table`] returns; quantities that need more rows or more motion than
+/// the log has are `None` or 0, as their documentation says.
+pub fn audit(log: &Log, columns: &Columns) -> Audit {
+    let mut audit = of_log(log, columns);
+    rest::tell_rest(std::slice::from_mut(&mut audit));
+    audit
+}
+
+/// Measures the quality of logs that are used together, as [`audit`] does that of each: a joint may rest in one that moves
+/// in another.
+pub fn audit_together<'l>(
+    logs: impl IntoIterator<Item = &'l Log>,
+    columns: &Columns,
+) -> Vec<Audit> {
+    let logs = logs.into_iter();
+    let mut audits: Vec<Audit> = logs.map(|log| of_log(log, columns)).collect();
+    rest::tell_rest(&mut audits);
+    audits
+}
+
+/// What a log alone tells.
+fn of_log(log: &Log, columns: &Columns) -> Audit {
+    let (meant, misread) = misread::as_meant(log, columns);
+    let mut audit = measured(&meant.log, meant.joints);
+    let findings = findings::of(&audit, &meant.log);
+    if !misread.is_empty() {
+        audit = measured(log, joint::audit_joints(log));
+    }
+    audit.findings = [misread, findings].concat();
+    audit.findings.sort_by_key(|finding| finding.severity);
+    audit
+}
+
+/// The numbers of an audit.
+fn measured(log: &Log, joints: Vec<JointAudit>) -> Audit {
+    let mut steps = differences(&log.time);
+    let median_step_s = median(&steps);
+    let min_step_s = steps.iter().copied().reduce(f64::min).unwrap_or(0.0);
+    let max_step_s = steps.iter().copied().reduce(f64::max).unwrap_or(0.0);
+    let is_gap = |step: f64| is_gap(step, median_step_s);
+    let gap = |pair: &[f64]| Interval {
+        start_s: pair[0],
+        end_s: pair[1],
+    };
+    let gaps = log.time.windows(2).filter(|pair| is_gap(pair[1] - pair[0]));
+    steps.retain(|step| !is_gap(*step));
+    Audit {
+        log: log.name(),
+        rows: log.rows(),
+        examined_rows: examined(log.rows()).iter().map(Range::len).sum(),
+        duration_s: log.duration(),
+        median_step_s,
+        min_step_s,
+        max_step_s,
+        jitter: relative_deviation(&steps, median_step_s),
+        gaps: gaps.map(gap).collect(),
+        dropped_rows: dropped(log).iter().map(|dropped| dropped.count).sum(),
+        driven_by: log.driven_by,
+        joints,
+        repeats: None,
+        findings: vec![],
+    }
+}
+
+/// Standard deviation of the steps over their median; 0 for no steps.
+fn relative_deviation(steps: &[f64], median_step_s: f64) -> f64 {
+    if steps.is_empty() {
+        return 0.0;
+    }
+    deviation(steps) / median_step_s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Quantity;
+
+    pub(super) fn audit(log: &Log) -> Audit {
+        super::audit(log, &Columns::default())
+    }
+
+    pub(super) fn one_joint(time: Vec<f64>, q: Vec<f64>, qd: Vec<f64>, tau: Vec<f64>) -> Log {
+        Log {
+            path: "rig.csv".into(),
+            time,
+            q: vec![q],
+            qd: vec![qd],
+            tau: vec![tau],
+            driven_by: Quantity::Torque,
+            masked: vec![vec![]],
+            filled: vec![],
+            leave_out: vec![],
+            notes: vec![],
+        }
+    }
+
+    fn uniform(rows: usize, step_s: f64) -> Vec<f64> {
+        (0..rows).map(|row| row as f64 * step_s).collect()
+    }
+
+    /// A swing q = sin(3t) + 0.4 sin(7.3t) whose torque is its acceleration, sampled at 500 Hz.
+    pub(super) fn swing() -> Log {
+        let time = uniform(5000, 0.002);
+        let over = |f: fn(f64) -> f64| time.iter().map(|t| f(*t)).collect();
+        let q = over(|t| (3.0 * t).sin() + 0.4 * (7.3 * t).sin());
+        let qd = over(|t| 3.0 * (3.0 * t).cos() + 2.92 * (7.3 * t).cos());
+        let tau = over(|t| -9.0 * (3.0 * t).sin() - 21.316 * (7.3 * t).sin());
+        one_joint(time, q, qd, tau)
+    }
+
+    #[test]
+    fn sampling_is_measured_apart_from_gaps() {
+        let mut log = swing();
+        log.time.iter_mut().skip(2500).for_each(|t| *t += 0.2);
+        let audit = audit(&log);
+        assert_eq!(audit.gaps.len(), 1);
+        assert!((audit.gaps[0].length_s() - 0.202).abs() < 1e-9);
+        assert!(audit.jitter < 1e-9 && (audit.max_step_s - 0.202).abs() < 1e-9);
+    }
+
+    #[test]
+    fn short_and_constant_logs_are_audited() {
+        for rows in [2, 3, 5, 10, 30] {
+            let still = one_joint(
+                uniform(rows, 0.01),
+                vec![1.0; rows],
+                vec![0.0; rows],
+                vec![0.0; rows],
+            );
+            let ramp = one_joint(
+                uniform(rows, 0.01),
+                uniform(rows, 0.1),
+                vec![10.0; rows],
+                vec![1.0; rows],
+            );
+            for log in [still, ramp] {
+                let audit = audit(&log);
+                assert!(!audit.findings.is_empty());
+                assert!(!audit.to_string().contains("NaN"), "{audit}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_clock_that_jumps_by_years_costs_no_memory() {
+        let mut log = swing();
+        log.time.iter_mut().skip(2500).for_each(|t| *t += 1e9);
+        let audit = audit(&log);
+        assert_eq!((audit.gaps.len(), audit.joints[0].velocity), (1, None));
+    }
+
+    #[test]
+    fn irregular_sampling_is_audited() {
+        let mut log = swing();
+        let late = |row: usize| 0.0009 * ((row * 7919) % 13) as f64 / 13.0;
+        log.time
+            .iter_mut()
+            .enumerate()
+            .for_each(|(row, t)| *t += late(row));
+        assert!(audit(&log).jitter > 0.1);
+    }
+}

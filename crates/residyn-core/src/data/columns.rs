@@ -1,0 +1,529 @@
+//! The mapping from columns of a file to channels.
+
+use std::path::Path;
+
+use super::column::{Column, Quantity};
+use super::error::{LogError, Place};
+use crate::expr::listed;
+
+/// Columns in which a log file holds time, angles, velocities and torques, and their units.
+///
+/// This is the `[columns]` table of a model file. An empty list stands for the standard names
+/// (`q1..`, `qd1..`, `tau1..` or `cmd1..`) in standard units, so that a model file has to name only what differs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    pub time: Column,
+    /// Joint angles, joint 1 first.
+    pub q: Vec<Column>,
+    /// Joint velocities, joint 1 first; `None` where they are to come from the angles.
+    pub qd: Option<Vec<Column>>,
+    /// Joint torques or commands of the drives, joint 1 first.
+    pub tau: Vec<Column>,
+    /// Which of the two they are: [`Quantity::Torque`] or [`Quantity::Command`].
+    pub driven_by: Quantity,
+    /// The topic of a recording that has the joints; `None` where their names tell.
+    pub topic: Option<String>,
+    /// Names of the joints, if they have any. A standard column that a header lacks may be called by its joint's: `q_elbow`
+    /// for `q2`.
+    pub joint_names: Vec<String>,
+}
+
+impl Default for Columns {
+    /// `time`, and the standard names for however many joints the model has.
+    fn default() -> Self {
+        Self {
+            time: Column::named("time"),
+            q: vec![],
+            qd: Some(vec![]),
+            tau: vec![],
+            driven_by: Quantity::Torque,
+            topic: None,
+            joint_names: vec![],
+        }
+    }
+}
+
+impl Columns {
+    /// The standard columns `time`, `q1..`, `qd1..`, and `tau1..` or `cmd1..`, for a number of joints.
+    pub fn standard(joints: usize, driven_by: Quantity) -> Self {
+        Self {
+            q: numbered("q", joints),
+            qd: Some(numbered("qd", joints)),
+            tau: numbered(driven_by.key(), joints),
+            driven_by,
+            ..Self::default()
+        }
+    }
+
+    /// All columns: time, angles, velocities, torques.
+    pub(crate) fn in_file_order(&self) -> impl Iterator<Item = &Column> {
+        std::iter::once(&self.time)
+            .chain(&self.q)
+            .chain(self.qd.iter().flatten())
+            .chain(&self.tau)
+    }
+
+    /// The line of a model file under `[columns]` for one of the quantities: `tau = [{ column = "tau1", factor = -1 }]`.
+    pub fn line(&self, quantity: Quantity) -> String {
+        let list = |columns: &[Column]| {
+            let columns: Vec<String> = columns.iter().map(Column::to_string).collect();
+            format!("[{}]", columns.join(", "))
+        };
+        let value = match quantity {
+            Quantity::Time => self.time.to_string(),
+            Quantity::Angle => list(&self.q),
+            Quantity::Velocity => list(self.qd.as_deref().unwrap_or_default()),
+            Quantity::Torque | Quantity::Command => list(&self.tau),
+        };
+        format!("{} = {value}", quantity.key())
+    }
+
+    /// These columns with every empty list filled with the standard names; `None` where a list has another length.
+    pub(super) fn whole(&self, joints: usize) -> Option<Columns> {
+        self.completed(joints, Path::new("")).ok()
+    }
+
+    /// These columns with every empty list filled with the standard names.
+    ///
+    /// # Errors
+    /// A list of another length.
+    pub fn completed(&self, joints: usize, path: &Path) -> Result<Columns, LogError> {
+        let list = |list: &'static str, columns: &Vec<Column>| match columns.len() {
+            0 => Ok(numbered(list, joints)),
+            named if named == joints => Ok(columns.clone()),
+            named => Err(LogError::Mapping {
+                path: path.to_owned(),
+                list,
+                named,
+                joints,
+            }),
+        };
+        Ok(Columns {
+            q: list("q", &self.q)?,
+            qd: self.qd.as_ref().map(|qd| list("qd", qd)).transpose()?,
+            tau: list(self.driven_by.key(), &self.tau)?,
+            ..self.clone()
+        })
+    }
+
+    /// Whether one of these columns is called so.
+    pub fn names(&self, name: &str) -> bool {
+        self.in_file_order().any(|column| column.name == name)
+    }
+
+    /// Whether a header has the angles of all joints.
+    pub fn has_angles_in(&self, header: &[String]) -> bool {
+        let renamed = self.clone().renamed_for(header);
+        renamed.q.iter().all(|column| header.contains(&column.name))
+    }
+
+    /// These columns, each that has its standard name and is not in the header by the name of its joint if that is there. A
+    /// single joint may be the only one of the header, or have none: `q` for `q1`.
+    fn renamed_for(mut self, header: &[String]) -> Columns {
+        let single = self.q.len() == 1;
+        if let (true, [], [joint]) = (single, &*self.joint_names, &*joints(header)) {
+            self.joint_names = vec![(*joint).to_owned()];
+        }
+        let has = |name: &String| header.contains(name);
+        let lists = [
+            ("q", Some(&mut self.q)),
+            ("qd", self.qd.as_mut()),
+            (self.driven_by.key(), Some(&mut self.tau)),
+        ];
+        for (stem, list) in lists {
+            for (joint, column) in list.into_iter().flatten().enumerate() {
+                if column.name != format!("{stem}{}", joint + 1) || has(&column.name) {
+                    continue;
+                }
+                let by_joint = self.joint_names.get(joint);
+                let by_joint = by_joint.map(|name| format!("{stem}_{name}"));
+                let alone = single.then(|| stem.to_owned());
+                if let Some(name) = by_joint.into_iter().chain(alone).find(has) {
+                    column.name = name;
+                }
+            }
+        }
+        self
+    }
+}
+
+/// The joints by whose names a header calls its angles.
+pub(super) fn joints(header: &[String]) -> Vec<&str> {
+    let joints = header.iter().filter_map(|name| name.strip_prefix("q_"));
+    joints.collect()
+}
+
+fn numbered(prefix: &str, joints: usize) -> Vec<Column> {
+    let joints = 1..=joints;
+    joints
+        .map(|joint| Column::named(format!("{prefix}{joint}")))
+        .collect()
+}
+
+/// Where one column of a channel stands in a row, and what its numbers become.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cell {
+    pub index: usize,
+    pub scale: f64,
+    pub wrapped: bool,
+    pub late_s: f64,
+}
+
+/// Words in the names of columns that hold torques or commands, and of those that hold velocities.
+const LIKE_DRIVEN: &[&str] = &["tau", "torque", "effort", "cmd", "command"];
+const LIKE_VELOCITY: &[&str] = &["qd", "dq", "vel", "speed", "omega", "rpm", "dot"];
+
+/// The header of a file, and its line.
+pub(super) struct Header<'a> {
+    pub path: &'a Path,
+    pub place: Place,
+    pub names: Vec<String>,
+}
+
+/// Where the channels stand in a row.
+#[derive(Debug, PartialEq)]
+pub(super) struct Layout {
+    pub time: Cell,
+    pub q: Vec<Cell>,
+    /// `None` where velocities come from the angles.
+    pub qd: Option<Vec<Cell>>,
+    /// `None` for the log of a passive rig, which has no torque columns.
+    pub tau: Option<Vec<Cell>>,
+    /// Names of the columns that nothing reads.
+    pub ignored: Vec<String>,
+}
+
+impl Layout {
+    /// The channels: angles, velocities, torques.
+    fn channels(&self) -> impl Iterator<Item = &Cell> {
+        let driven = self.qd.iter().chain(&self.tau).flatten();
+        self.q.iter().chain(driven)
+    }
+
+    /// Time and all channels.
+    pub fn cells(&self) -> impl Iterator<Item = &Cell> {
+        std::iter::once(&self.time).chain(self.channels())
+    }
+
+    /// How late each channel is, s.
+    pub fn late_s(&self) -> impl Iterator<Item = f64> {
+        self.channels().map(|cell| cell.late_s)
+    }
+}
+
+impl Header<'_> {
+    /// Finds the columns of a model with `joints` joints.
+    pub fn layout(&self, joints: usize, columns: &Columns) -> Result<Layout, LogError> {
+        self.check_is_a_header()?;
+        let columns = columns.completed(joints, self.path)?;
+        let standard = Columns {
+            topic: columns.topic.clone(),
+            joint_names: columns.joint_names.clone(),
+            ..Columns::standard(joints, columns.driven_by)
+        };
+        if columns == standard {
+            self.check_joint_count(joints)?;
+        }
+        let is_torque = columns.driven_by == Quantity::Torque;
+        let passive = is_torque && columns.tau == standard.tau && !self.has_one_like(LIKE_DRIVEN);
+        let still = columns.qd == standard.qd && !self.has_one_like(LIKE_VELOCITY);
+        let columns = columns.renamed_for(&self.names);
+        let all = |list: &[Column], quantity| {
+            let find = |column: &Column| self.find(column, quantity, &columns);
+            list.iter().map(find).collect::<Result<Vec<_>, _>>()
+        };
+        let qd = columns.qd.as_deref().filter(|_| !still);
+        let tau = Some(&columns.tau).filter(|_| !passive);
+        Ok(Layout {
+            time: self.find(&columns.time, Quantity::Time, &columns)?,
+            q: all(&columns.q, Quantity::Angle)?,
+            qd: qd.map(|qd| all(qd, Quantity::Velocity)).transpose()?,
+            tau: tau.map(|tau| all(tau, columns.driven_by)).transpose()?,
+            ignored: self.others(&columns),
+        })
+    }
+
+    fn check_is_a_header(&self) -> Result<(), LogError> {
+        let (path, place) = (self.path.to_owned(), self.place);
+        if self.names.iter().all(|name| name.parse::<f64>().is_ok()) {
+            return Err(LogError::NoHeader { path, place });
+        }
+        Ok(())
+    }
+
+    /// A header with another number of complete joints is most likely the log of another rig. Where
+    /// only one of a joint's columns is missing, a wrong name is more likely, which `find` reports.
+    fn check_joint_count(&self, joints: usize) -> Result<(), LogError> {
+        let has = |name: String| self.names.contains(&name);
+        let header = (1..).take_while(|joint| has(format!("q{joint}"))).count();
+        let next = header + 1;
+        let driven = [Quantity::Torque, Quantity::Command].map(|q| format!("{}{next}", q.key()));
+        let next_is_absent = !has(format!("qd{next}")) && !driven.into_iter().any(has);
+        if header > joints || (0 < header && header < joints && next_is_absent) {
+            return Err(LogError::JointCount {
+                path: self.path.to_owned(),
+                place: self.place,
+                header,
+                model: joints,
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether the name of some column holds one of these words. A torque or a velocity under an unexpected name must
+    /// not be passed over silently.
+    fn has_one_like(&self, words: &[&str]) -> bool {
+        let is_like = |name: &String| {
+            let name = name.to_lowercase();
+            words.iter().any(|word| name.contains(word))
+        };
+        // `q_level` is the angle of a joint, whatever its name.
+        let is_angle = |name: &String| name.starts_with("q_");
+        let mut others = self.names.iter().filter(|name| !is_angle(name));
+        others.any(is_like)
+    }
+
+    fn find(
+        &self,
+        wanted: &Column,
+        quantity: Quantity,
+        columns: &Columns,
+    ) -> Result<Cell, LogError> {
+        let name = &wanted.name;
+        let mut places = (0..self.names.len()).filter(|&index| self.names[index] == *name);
+        let (path, place, column) = (self.path.to_owned(), self.place, name.clone());
+        match (places.next(), places.next()) {
+            (Some(index), None) => Ok(Cell {
+                index,
+                scale: wanted.scale(quantity),
+                wrapped: wanted.wrapped,
+                late_s: wanted.late_s,
+            }),
+            (Some(_), Some(_)) => Err(LogError::DuplicateColumn {
+                path,
+                place,
+                column,
+            }),
+            (None, _) => Err(LogError::MissingColumn {
+                path,
+                place,
+                column,
+                remedy: self.remedy(name, quantity, &self.others(columns)),
+            }),
+        }
+    }
+
+    /// Points to the nearest of the names that are `free` (no other channel's) where one is near, and
+    /// to all names otherwise.
+    fn remedy(&self, wanted: &str, quantity: Quantity, free: &[String]) -> String {
+        let joints = joints(&self.names);
+        if !joints.is_empty() && quantity == Quantity::Angle {
+            return format!(
+                "the log has the joints {}: give those of the model their names, joint_names = [\"{}\", ..] under [system] in \
+                 the model file, or name the columns under [columns]: q = [\"q_{}\", ..]",
+                listed(joints.iter().copied()),
+                joints[0],
+                joints[0]
+            );
+        }
+        let nearest = free
+            .iter()
+            .map(|name| (likeness(name, wanted), name))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(likeness, _)| *likeness >= 0.5)
+            .map(|(_, name)| name);
+        let example = nearest.map_or("NAME", String::as_str);
+        let entry = match quantity {
+            Quantity::Time => format!("time = {example:?}"),
+            Quantity::Velocity => {
+                format!("qd = [{example:?}], or qd = [] to take velocities from the angles")
+            }
+            Quantity::Torque
+                if self
+                    .names
+                    .iter()
+                    .any(|name| name == "cmd1" || name.starts_with("cmd_")) =>
+            {
+                return "the log has commands, cmd1: say in [drive] of the model file what torque they make, \
+                        tau1 = \"kp*(cmd1 - q1) - kd*qd1\" for instance; `residyn list drives` shows ready ones"
+                    .to_owned();
+            }
+            list => format!("{} = [{example:?}]", list.key()),
+        };
+        let known = match nearest {
+            Some(name) => format!("did you mean {name:?}?"),
+            None => {
+                let names = listed(self.names.iter().map(String::as_str));
+                format!("the header has {names}.")
+            }
+        };
+        format!("{known} Rename it, or name it under [columns] in the model file: {entry}")
+    }
+
+    fn others(&self, columns: &Columns) -> Vec<String> {
+        let used = |name: &&String| columns.in_file_order().any(|wanted| wanted.name == **name);
+        let unused = self.names.iter().filter(|name| !used(name));
+        unused.cloned().collect()
+    }
+}
+
+/// 1 for the same name but for case, 0 for nothing in common; a swap of neighbours (`dq1` for `qd1`)
+/// counts as one change.
+fn likeness(a: &str, b: &str) -> f64 {
+    strsim::normalized_damerau_levenshtein(&a.to_lowercase(), &b.to_lowercase())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layout(header: &str, joints: usize, columns: &Columns) -> Result<Layout, LogError> {
+        let header = Header {
+            path: Path::new("rig.csv"),
+            place: Place::Line(1),
+            names: header.split(',').map(str::to_owned).collect(),
+        };
+        header.layout(joints, columns)
+    }
+
+    fn cell(index: usize) -> Cell {
+        let (scale, wrapped, late_s) = (1.0, false, 0.0);
+        Cell {
+            index,
+            scale,
+            wrapped,
+            late_s,
+        }
+    }
+
+    fn message(header: &str, joints: usize) -> String {
+        layout(header, joints, &Columns::default())
+            .unwrap_err()
+            .to_string()
+    }
+
+    #[test]
+    fn order_is_free_and_extra_columns_are_named() {
+        let found = layout("tau1,note,qd1,q1,time", 1, &Columns::default()).unwrap();
+        let expected = Layout {
+            time: cell(4),
+            q: vec![cell(3)],
+            qd: Some(vec![cell(2)]),
+            tau: Some(vec![cell(0)]),
+            ignored: vec!["note".to_owned()],
+        };
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn a_near_name_is_suggested_with_its_mapping() {
+        assert_eq!(
+            message("time,q1,dq1,tau1", 1),
+            "rig.csv, line 1: there is no column \"qd1\"; did you mean \"dq1\"? Rename it, or name it \
+             under [columns] in the model file: qd = [\"dq1\"], or qd = [] to take velocities from the angles"
+        );
+        assert!(
+            message("Time,q1,qd1,tau1", 1).ends_with("in the model file: time = \"Time\""),
+            "{}",
+            message("Time,q1,qd1,tau1", 1)
+        );
+        assert!(message("time,angle,qd1", 1).contains("the header has time, angle, qd1."));
+    }
+
+    #[test]
+    fn another_number_of_joints_is_told_as_such() {
+        let more = message("time,q1,q2,qd1,qd2,tau1,tau2", 1);
+        assert!(
+            more.contains("has 2 joint(s) (q1 to q2) but the model has 1"),
+            "{more}"
+        );
+        let fewer = message("time,q1,qd1,tau1", 2);
+        assert!(
+            fewer.contains("has 1 joint(s) (q1 to q1) but the model has 2"),
+            "{fewer}"
+        );
+        let misspelt = message("time,q1,Q2,qd1,qd2,tau1,tau2", 2);
+        assert!(misspelt.contains("did you mean \"Q2\"?"), "{misspelt}");
+    }
+
+    #[test]
+    fn a_mapping_chooses_one_joint_of_many() {
+        let columns = Columns {
+            q: vec!["q2".into()],
+            qd: Some(vec!["qd2".into()]),
+            tau: vec!["tau2".into()],
+            ..Columns::default()
+        };
+        let found = layout("time,q1,q2,qd1,qd2,tau1,tau2", 1, &columns).unwrap();
+        assert_eq!(
+            (found.q, found.qd, found.tau),
+            (vec![cell(2)], Some(vec![cell(4)]), Some(vec![cell(6)]))
+        );
+    }
+
+    #[test]
+    fn columns_may_have_the_names_of_the_joints() {
+        let columns = Columns {
+            joint_names: vec!["base".into(), "elbow".into()],
+            ..Columns::default()
+        };
+        let header = "time,q_elbow,q_base,qd1,qd2,tau_base,tau_elbow";
+        let found = layout(header, 2, &columns).unwrap();
+        assert_eq!(found.q, [cell(2), cell(1)]);
+        assert_eq!(found.qd, Some(vec![cell(3), cell(4)]));
+        assert_eq!(found.tau, Some(vec![cell(5), cell(6)]));
+    }
+
+    #[test]
+    fn a_single_joint_needs_no_number() {
+        for header in ["time,q,qd,tau", "time,q_hip,qd_hip,tau_hip"] {
+            let found = layout(header, 1, &Columns::default()).unwrap();
+            assert_eq!((found.q, found.qd), (vec![cell(1)], Some(vec![cell(2)])));
+            assert_eq!(found.tau, Some(vec![cell(3)]));
+        }
+        assert!(message("time,q,qd,tau", 2).contains("there is no column \"q1\""));
+        assert!(message("time,q_hip,q_knee", 1).contains("joint_names = [\"hip\", ..]"));
+    }
+
+    #[test]
+    fn only_a_header_without_any_torque_is_passive() {
+        assert_eq!(
+            layout("time,q1,qd1", 1, &Columns::default()).unwrap().tau,
+            None
+        );
+        assert!(message("time,q1,qd1,torque_1", 1).contains("there is no column \"tau1\""));
+        assert!(message("time,q1,q2,qd1,qd2,tau1", 2).contains("there is no column \"tau2\""));
+    }
+
+    #[test]
+    fn only_a_header_without_any_velocity_takes_them_from_the_angles() {
+        let none = layout("time,q1,tau1", 1, &Columns::default()).unwrap();
+        assert_eq!((none.qd, none.tau), (None, Some(vec![cell(2)])));
+        assert!(message("time,q1,velocity_1,tau1", 1).contains("there is no column \"qd1\""));
+        let from_angles = Columns {
+            qd: None,
+            ..Columns::default()
+        };
+        let found = layout("time,q1,qd1,tau1", 1, &from_angles).unwrap();
+        assert_eq!((found.qd, found.ignored), (None, vec!["qd1".to_owned()]));
+    }
+
+    #[test]
+    fn mappings_of_the_wrong_length_and_twins_are_errors() {
+        let columns = Columns {
+            tau: vec!["a".into(), "b".into()],
+            ..Columns::default()
+        };
+        let error = layout("time,q1,qd1,a,b", 1, &columns).unwrap_err();
+        assert!(
+            error.to_string().contains("names 2 column(s) for `tau`"),
+            "{error}"
+        );
+        assert!(message("time,q1,q1,qd1,tau1", 1).contains("column \"q1\" occurs more than once"));
+    }
+
+    #[test]
+    fn numbers_are_no_header() {
+        assert!(message("0,1,2,3", 1).contains("has numbers where the header should be"));
+    }
+}

@@ -1,0 +1,54 @@
+//! Logs of mechanical rigs in memory: columns, audit, statistics.
+//!
+//! A [`Log`] is one trajectory: times, joint angles, joint velocities and joint torques, in s, rad,
+//! rad/s and N m. [`Log::of_table`] takes it from named columns and refuses what it cannot read with an
+//! error that names place, column and remedy; numbers are never repaired. [`audit`] measures the
+//! quality of a log (sampling, noise, spikes, lags, excitation) and puts what matters for fitting a
+//! model into plain sentences.
+//!
+//! The torque of row `i` acts from `time[i]` to `time[i + 1]` (zero-order hold).
+
+mod audit;
+mod channels;
+mod column;
+mod columns;
+mod dropped;
+mod error;
+mod examined;
+mod instant;
+mod joint;
+mod jumps;
+mod lag;
+mod late;
+pub mod leave_out;
+mod local_cubic;
+mod log;
+mod low_pass;
+mod projection;
+mod read;
+mod signal;
+mod smooth;
+pub mod statistics;
+pub mod table;
+mod trajectory;
+
+pub(crate) use audit::reversed_driving;
+pub use audit::{
+    Audit, Channel, Finding, JointAudit, MAX_LAG_S, Remedy, Repeated, Response, Severity,
+    TorqueDemand, TorqueLag, VelocityCheck, audit, audit_together, tell_repeats,
+};
+pub use channels::Channels;
+pub use column::{Column, Quantity};
+pub use columns::Columns;
+pub(crate) use dropped::is_gap;
+pub use error::{CellFault, LogError, Place};
+pub(crate) use instant::SAME_S;
+pub use instant::{row_after, row_from};
+pub use joint::{Joint, JointError};
+pub use leave_out::{LeaveOut, LeaveOutError};
+pub(crate) use local_cubic::rows_around;
+pub use local_cubic::{LocalCubic, half_width_s, local_cubic};
+pub use log::{Interval, Log};
+pub use smooth::{Smooth, Smoothing};
+pub use table::{Arrays, Numbers, Numeric, Table};
+pub use trajectory::{Thinning, Trajectory, trajectories};

@@ -1,0 +1,153 @@
+use std::fmt;
+
+use serde::Serialize;
+use thiserror::Error;
+
+use super::normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
+use super::values::Column;
+use crate::decomposition::eigen;
+
+/// Why parameters could not be fitted.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum FitError {
+    #[error(
+        "the logs give no window to fit: every stretch is shorter than a window, broken by a gap or left out; record longer logs or leave out less"
+    )]
+    NoWindow,
+    #[error(
+        "with its starting values the model diverges in {diverged} of {windows} windows of the logs; give parameters nearer to the rig in the model file"
+    )]
+    Diverged { diverged: usize, windows: usize },
+}
+
+/// The result of a fit beside the values found: its cost, how it ended, and the normal equations there.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Which parameters were free.
+    pub active: Vec<usize>,
+    /// The free values: one column for each free parameter, or one for each log where it differs by log.
+    pub columns: Vec<Column>,
+    /// Each window's own values: its start state, then forces if they were free.
+    pub locals: Vec<Vec<f64>>,
+    /// Robust standard deviation of the normalised residuals: 1 where the model explains all but noise.
+    pub scale: f64,
+    /// Sum of the losses at that scale.
+    pub cost: f64,
+    /// What the departure from the declared values costs beside it.
+    pub departure: f64,
+    /// What the declared values add to the normal equations; no cost.
+    pub(super) prior: WindowTerms,
+    /// The part of them that is of bodies, which are known to be near those declared: like data. With its cost.
+    pub(super) bodies: WindowTerms,
+    /// The normal equations of each window in the free values, its own values eliminated.
+    pub reduced: Vec<Reduced>,
+    /// Steps that were taken.
+    pub steps: usize,
+    /// The cost after each, in units of the sensors' noise: times the square of the scale that it had then.
+    pub trace: Vec<f64>,
+    /// Why there were no more.
+    pub termination: Termination,
+}
+
+impl Fit {
+    /// Zero normal equations in the free values.
+    pub fn zero_equations(&self) -> WindowTerms {
+        WindowTerms::zeros(self.columns.len())
+    }
+
+    /// Normal equations of all windows.
+    pub fn equations(&self) -> WindowTerms {
+        let mut all = self.zero_equations();
+        for window in &self.reduced {
+            window.add_to(&mut all);
+        }
+        all
+    }
+
+    /// The same with what the declared values tell: those whose gradient is zero where the fit ended.
+    pub fn equations_and_prior(&self) -> WindowTerms {
+        let mut all = self.equations();
+        all.gradient += &self.prior.gradient;
+        all.hessian += &self.prior.hessian;
+        all
+    }
+
+    /// Largest over smallest eigenvalue of the normal equations' matrix in the free values, as they are and in units in
+    /// which each of them alone has the same information; infinite where the matrix is singular, 1 without free values.
+    pub fn condition(&self) -> [f64; 2] {
+        let matrix = self.equations().hessian;
+        let (scaled, _) = with_unit_diagonal(&matrix);
+        [matrix, scaled].map(|matrix| {
+            if matrix.is_empty() {
+                return 1.0;
+            }
+            let Some(eigen) = eigen(matrix) else {
+                return f64::INFINITY;
+            };
+            let values = eigen.eigenvalues;
+            let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let largest = values.iter().copied().fold(0.0, f64::max);
+            if smallest > 0.0 {
+                largest / smallest
+            } else {
+                f64::INFINITY
+            }
+        })
+    }
+
+    /// Normal equations of each group of windows; `groups` gives the group of each window, counted from 0.
+    pub fn equations_by(&self, groups: &[usize]) -> Vec<WindowTerms> {
+        let count = groups.iter().max().map_or(0, |last| last + 1);
+        let mut parts = vec![self.zero_equations(); count];
+        for (window, &group) in self.reduced.iter().zip(groups) {
+            window.add_to(&mut parts[group]);
+        }
+        parts
+    }
+}
+
+/// Why a fit ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Termination {
+    /// Converged: the last step lowered the cost by less than the share that matters.
+    SmallDecrease,
+    /// Converged: no step lowers the cost, and its quadratic model predicts that none would by a share that matters.
+    SmallPredictedDecrease,
+    /// Not converged: no step lowers the cost, although its quadratic model predicts a decrease.
+    NoDescent,
+    /// Not converged: the normal equations are not positive definite or not finite, however much they are damped.
+    Singular,
+    /// Not converged: the cost was still falling after the largest number of steps.
+    StepLimit,
+    /// Not converged: the cost was not coming down to where the fit would have been of use.
+    GivenUp,
+    /// No value was free to change but the windows' own, or none at all: the model was evaluated as it was given.
+    AsGiven,
+}
+
+impl Termination {
+    /// Whether the values may be taken as the minimum of the cost.
+    pub fn has_converged(self) -> bool {
+        match self {
+            Self::SmallDecrease | Self::SmallPredictedDecrease | Self::AsGiven => true,
+            Self::NoDescent | Self::Singular | Self::StepLimit | Self::GivenUp => false,
+        }
+    }
+}
+
+impl fmt::Display for Termination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::SmallDecrease => "converged: the last step hardly lowered the loss",
+            Self::SmallPredictedDecrease => "converged: no step lowers the loss any further",
+            Self::NoDescent => {
+                "not converged: no step lowers the loss, although its derivatives predict a decrease"
+            }
+            Self::Singular => "not converged: the normal equations cannot be solved",
+            Self::StepLimit => "not converged: the loss was still falling at the last step allowed",
+            Self::GivenUp => "not converged: given up, the loss was not coming down far enough",
+            Self::AsGiven => "evaluated as given",
+        })
+    }
+}

@@ -1,0 +1,610 @@
+use crate::expr::{Graph, Node, Program, Tape};
+use crate::lanes::{Row, Simd, WithSimd};
+use crate::model::Dynamics;
+use crate::sim::{Hold, Scheme, StepTorque};
+
+/// Windows that are integrated side by side: two AVX-512 registers or four AVX2 registers of f64.
+pub(super) const LANES: usize = 16;
+pub(super) type Lane = Row<f64, LANES>;
+
+/// The free values of each window, besides the parameters that all windows share.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Local {
+    /// The state at the window's start.
+    State,
+    /// The start state and a constant generalised force per joint, which stands for what the model lacks.
+    StateAndForce,
+    /// None: the torques of a known motion.
+    Nothing,
+}
+
+/// The tangent-linear model: accelerations and their derivatives with respect to states, shared parameters and forces,
+/// as one program.
+///
+/// Outputs: the n accelerations; per joint the derivatives of its acceleration with respect to `q` and `qd`; per active
+/// parameter, and per force if forces are free, the derivatives of all accelerations. dq/dt = qd is assumed. Inputs:
+/// those of the model, with the derivatives of the torques with respect to filter parameters inserted before its
+/// parameters.
+pub(super) struct Tangent {
+    pub program: Program,
+    /// The sensor model, if it is not the identity: the n measured angles; per joint their derivatives with respect to
+    /// `q` and `qd`; per joint those with respect to active parameters. Inputs: those of the model.
+    pub reading: Option<Program>,
+    pub joints: usize,
+    /// Number of the model's filters.
+    filters: usize,
+    /// Indices into the model's parameters.
+    pub active: Vec<usize>,
+    /// Of a balance of torques, the columns that the difference of each joint depends on; else empty.
+    pub columns_of: Vec<Vec<usize>>,
+    pub local: Local,
+}
+
+impl Tangent {
+    pub fn new(dynamics: &Dynamics, active: &[usize], local: Local) -> Self {
+        if local == Local::Nothing {
+            return Self::of_torques(dynamics, active);
+        }
+        let n = dynamics.joints;
+        let mut graph = Graph::new();
+        let (moving, held) = dynamics.program.inputs().split_at(3 * n + 1);
+        let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
+        let slopes = (dynamics.filters.iter())
+            .map(|filter| graph.input(&format!("slope of {}", filter.parameter)))
+            .collect::<Vec<_>>();
+        inputs.extend(held.iter().map(|name| graph.input(name)));
+        let outputs = graph.append(&dynamics.program, &inputs);
+        let accelerations = &outputs[n..];
+        let mut wrt = inputs[..2 * n].to_vec();
+        wrt.extend(active.iter().map(|&k| inputs[3 * n + 1 + k]));
+        if local == Local::StateAndForce {
+            wrt.extend(&inputs[2 * n..3 * n]);
+        }
+        let mut jacobian = graph.jacobian(accelerations, &wrt);
+        for (filter, slope) in dynamics.filters.iter().zip(slopes) {
+            let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
+                continue;
+            };
+            let by_torque = graph.jacobian(accelerations, &[inputs[2 * n + filter.joint.index()]]);
+            for (row, by_torque) in jacobian.iter_mut().zip(by_torque) {
+                row[2 * n + column] = graph.mul(by_torque[0], slope);
+            }
+        }
+        let by_states = jacobian.iter().flat_map(|row| &row[..2 * n]);
+        let others = (2 * n..wrt.len()).flat_map(|k| jacobian.iter().map(move |row| &row[k]));
+        let all: Vec<Node> = (accelerations.iter().chain(by_states).chain(others))
+            .copied()
+            .collect();
+        Self {
+            program: graph.finish(&all),
+            reading: reading(dynamics, active),
+            joints: n,
+            filters: dynamics.filters.len(),
+            active: active.to_vec(),
+            columns_of: Vec::new(),
+            local,
+        }
+    }
+
+    /// Columns of the sensitivities: shared parameters, then the window's own free values.
+    pub fn columns(&self) -> usize {
+        self.active.len() + self.locals()
+    }
+
+    /// The first output with the partial derivatives df/dc of a column c, or `None` where they are zero. Column 0 is the
+    /// state itself, whose slopes are the accelerations.
+    #[inline(always)]
+    fn direct(&self, column: usize) -> Option<usize> {
+        let (n, shared) = (self.joints, self.active.len());
+        let others = n + 2 * n * n;
+        match column.checked_sub(1) {
+            None => Some(0),
+            Some(parameter) if parameter < shared => Some(others + n * parameter),
+            Some(state) if state < shared + 2 * n => None,
+            Some(force) => Some(others + n * (force - 2 * n)),
+        }
+    }
+
+    /// Index of the first parameter among the inputs.
+    pub fn first_parameter(&self) -> usize {
+        let moving = match self.local {
+            Local::Nothing => 5,
+            Local::State | Local::StateAndForce => 3,
+        };
+        moving * self.joints + 1 + self.filters
+    }
+
+    /// Of a balance of torques: for each joint the columns that its difference depends on, and the outputs with its slopes by
+    /// them.
+    pub fn slopes(&self) -> impl Iterator<Item = (&[usize], std::ops::Range<usize>)> {
+        let mut next = self.joints;
+        self.columns_of.iter().map(move |columns| {
+            let first = next;
+            next += columns.len();
+            (columns.as_slice(), first..next)
+        })
+    }
+
+    /// Number of free values of one window.
+    pub fn locals(&self) -> usize {
+        match self.local {
+            Local::State => 2 * self.joints,
+            Local::StateAndForce => 3 * self.joints,
+            Local::Nothing => 0,
+        }
+    }
+
+    /// Of the balance of torques: outputs are the n differences, then for each of them its derivatives with respect to the
+    /// active parameters that it depends on.
+    fn of_torques(dynamics: &Dynamics, active: &[usize]) -> Self {
+        let n = dynamics.joints;
+        let mut graph = Graph::new();
+        let (moving, held) = dynamics.program.inputs().split_at(5 * n + 1);
+        let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
+        let slopes = (dynamics.filters.iter())
+            .map(|filter| graph.input(&format!("slope of {}", filter.parameter)))
+            .collect::<Vec<_>>();
+        inputs.extend(held.iter().map(|name| graph.input(name)));
+        let differences = graph.append(&dynamics.program, &inputs);
+        let given = inputs.len() - dynamics.parameters.len();
+        let wrt: Vec<Node> = active.iter().map(|&k| inputs[given + k]).collect();
+        let mut jacobian = graph.jacobian(&differences, &wrt);
+        for (filter, slope) in dynamics.filters.iter().zip(slopes) {
+            let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
+                continue;
+            };
+            let by_torque = graph.jacobian(&differences, &[inputs[2 * n + filter.joint.index()]]);
+            for (row, by_torque) in jacobian.iter_mut().zip(by_torque) {
+                row[column] = graph.mul(by_torque[0], slope);
+            }
+        }
+        let depends = |row: &Vec<Node>| -> Vec<usize> {
+            (0..row.len())
+                .filter(|column| !graph.is_zero(row[*column]))
+                .collect()
+        };
+        let columns_of: Vec<Vec<usize>> = jacobian.iter().map(depends).collect();
+        let own = jacobian.iter().zip(&columns_of);
+        let slopes = own.flat_map(|(row, columns)| columns.iter().map(|column| row[*column]));
+        let outputs: Vec<Node> = differences.into_iter().chain(slopes).collect();
+        Self {
+            program: graph.finish(&outputs),
+            reading: None,
+            joints: n,
+            filters: dynamics.filters.len(),
+            active: active.to_vec(),
+            columns_of,
+            local: Local::Nothing,
+        }
+    }
+}
+
+/// The program of [`Tangent::reading`].
+fn reading(dynamics: &Dynamics, active: &[usize]) -> Option<Program> {
+    let n = dynamics.joints;
+    let mut graph = Graph::new();
+    let names = dynamics.program.inputs();
+    let inputs: Vec<_> = names.iter().map(|name| graph.input(name)).collect();
+    let shown = graph.append(dynamics.reading.as_ref()?, &inputs);
+    let parameters: Vec<_> = active.iter().map(|&k| inputs[3 * n + 1 + k]).collect();
+    let by_state = graph.jacobian(&shown, &inputs[..2 * n]).concat();
+    let by_parameter = graph.jacobian(&shown, &parameters).concat();
+    Some(graph.finish(&[shown, by_state, by_parameter].concat()))
+}
+
+/// Integrates the states and their sensitivities together.
+///
+/// The sensitivity S of the state with respect to a column c obeys dS/dt = (df/ds) S + df/dc. Rows are positions, then
+/// velocities.
+pub(super) struct TangentStepper<'t> {
+    tangent: &'t Tangent,
+    scheme: &'static Scheme,
+    torque: StepTorque<LANES>,
+    tape: Tape<'t, f64, LANES>,
+    /// The state, then the sensitivity of each column: 2n rows each.
+    now: Vec<Lane>,
+    inner: Vec<Lane>,
+    next: Vec<Lane>,
+    sum: Vec<Lane>,
+    /// Derivatives of the accelerations with respect to the state, `[joint * 2n + state]`.
+    by_state: Vec<Lane>,
+    reading: Option<Tape<'t, f64, LANES>>,
+    /// The measured angles, then their sensitivities `[joint * columns + column]`.
+    shown: Vec<Lane>,
+}
+
+impl<'t> TangentStepper<'t> {
+    pub fn new(tangent: &'t Tangent, values: &[f64], scheme: &'static Scheme) -> Self {
+        let n = tangent.joints;
+        let first = tangent.first_parameter();
+        let mut tape = tangent.program.tape_with_held(first);
+        for (slot, value) in tape.inputs()[first..].iter_mut().zip(values) {
+            *slot = Row::splat(*value);
+        }
+        let mut reading = tangent
+            .reading
+            .as_ref()
+            .map(|reading| reading.tape_with_held(3 * n + 1));
+        if let Some(reading) = &mut reading {
+            for (slot, value) in reading.inputs()[3 * n + 1..].iter_mut().zip(values) {
+                *slot = Row::splat(*value);
+            }
+        }
+        let rows = |count: usize| vec![Row::splat(0.0); count];
+        let size = 2 * n * (1 + tangent.columns());
+        Self {
+            tangent,
+            scheme,
+            torque: StepTorque::default(),
+            tape,
+            now: rows(size),
+            inner: rows(size),
+            next: rows(size),
+            sum: rows(size),
+            by_state: rows(2 * n * n),
+            reading,
+            shown: rows(size / 2),
+        }
+    }
+
+    /// Set the value of a parameter in one lane.
+    pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
+        self.tape.inputs()[self.tangent.first_parameter() + parameter][lane] = value;
+        if let Some(reading) = &mut self.reading {
+            reading.inputs()[3 * self.tangent.joints + 1 + parameter][lane] = value;
+        }
+    }
+
+    /// The measured angles (`[n]`) and their sensitivities (`[joint * columns + column]`). `tau` is the torque that acted
+    /// until now.
+    pub fn shown(&mut self, tau: impl FnOnce() -> Vec<Lane>, time: Lane) -> (&[Lane], &[Lane]) {
+        let (n, columns) = (self.tangent.joints, self.tangent.columns());
+        let (state, sensitivities) = self.now.split_at(2 * n);
+        let (angles, slopes) = self.shown.split_at_mut(n);
+        let Some(reading) = &mut self.reading else {
+            angles.copy_from_slice(&state[..n]);
+            for (joint, slopes) in slopes.chunks_exact_mut(columns).enumerate() {
+                for (slope, column) in slopes.iter_mut().zip(sensitivities.chunks_exact(2 * n)) {
+                    *slope = column[joint];
+                }
+            }
+            return (angles, slopes);
+        };
+        let inputs = reading.moving();
+        inputs[..2 * n].copy_from_slice(state);
+        inputs[2 * n..3 * n].copy_from_slice(&tau());
+        inputs[3 * n] = time;
+        reading.run();
+        let shared = self.tangent.active.len();
+        for (joint, slopes) in slopes.chunks_exact_mut(columns).enumerate() {
+            angles[joint] = *reading.output(joint);
+            for (column, slope) in slopes.iter_mut().enumerate() {
+                let direct = n + 2 * n * n + joint * shared + column;
+                *slope = if column < shared {
+                    *reading.output(direct)
+                } else {
+                    Row::splat(0.0)
+                };
+                for (state, own) in sensitivities[2 * n * column..][..2 * n].iter().enumerate() {
+                    let by_state = reading.output(n + joint * 2 * n + state);
+                    for lane in 0..LANES {
+                        slope[lane] += by_state[lane] * own[lane];
+                    }
+                }
+            }
+        }
+        (angles, slopes)
+    }
+
+    /// Start at these states (`[2n][lane]`). Their sensitivity to themselves is the identity, all others are zero.
+    pub fn start(&mut self, states: &[Lane]) {
+        let (n, shared) = (self.tangent.joints, self.tangent.active.len());
+        self.now.fill(Row::splat(0.0));
+        self.now[..2 * n].copy_from_slice(&states[..2 * n]);
+        for row in 0..2 * n {
+            self.now[2 * n * (1 + shared + row) + row] = Row::splat(1.0);
+        }
+    }
+
+    /// Move states and sensitivities to the end of a hold.
+    pub fn advance(&mut self, hold: &Hold<'_, LANES>) {
+        self.torque.fill(hold);
+        Lane::dispatch(Advance {
+            stepper: self,
+            time: hold.from,
+            length: hold.length,
+            substeps: hold.substeps,
+        });
+    }
+
+    #[inline(always)]
+    fn step<S: Simd>(&mut self, simd: S, time: &Lane, h: &Lane) {
+        let n = self.tangent.joints;
+        let last = self.scheme.stages.len() - 1;
+        for (k, stage) in self.scheme.stages.iter().enumerate() {
+            let inner = if k == 0 { &self.now } else { &self.inner };
+            let inputs = self.tape.moving();
+            inputs[..2 * n].copy_from_slice(&inner[..2 * n]);
+            let (mut weighed, mut reached) = (*h, *h);
+            for part in 0..Lane::parts::<S>() {
+                let h = h.get(simd, part);
+                inputs[3 * n].set(part, h.mul_add(h.like(stage.time), time.get(simd, part)));
+                weighed.set(part, h * h.like(stage.weight));
+                reached.set(part, h * h.like(stage.reach));
+            }
+            self.tape.run_on(simd);
+            for (k, slope) in self.by_state.iter_mut().enumerate() {
+                *slope = *self.tape.output(n + k);
+            }
+            self.limit_damping(simd, h);
+            // Known at compile time in each call: the loops over rows have no branches.
+            match (k == 0, k == last) {
+                (true, true) => self.stage(simd, true, true, &weighed, &reached),
+                (true, false) => self.stage(simd, true, false, &weighed, &reached),
+                (false, true) => self.stage(simd, false, true, &weighed, &reached),
+                (false, false) => self.stage(simd, false, false, &weighed, &reached),
+            }
+            std::mem::swap(&mut self.inner, &mut self.next);
+        }
+        if self.scheme.semi_implicit {
+            self.move_with_new_velocities(simd, h);
+        }
+        std::mem::swap(&mut self.now, &mut self.sum);
+    }
+
+    /// Scale the derivatives with respect to each velocity where their damping, over one step, is more than the scheme can
+    /// follow. A joint that sticks is damped far more strongly: its motion stays small, but sensitivities would grow
+    /// without bound where in truth they vanish.
+    #[inline(always)]
+    fn limit_damping<S: Simd>(&mut self, simd: S, h: &Lane) {
+        let n = self.tangent.joints;
+        for part in 0..Lane::parts::<S>() {
+            let h = h.get(simd, part);
+            // Friction of each joint alone makes a matrix without negative eigenvalues, of which none is above their sum.
+            let mut all = h.like(0.0);
+            for j in 0..n {
+                let damping = -(self.by_state[(2 * n + 1) * j + n].get(simd, part) * h);
+                all = all + damping.max(h.like(0.0));
+            }
+            let limit = h.like(self.scheme.most_damping);
+            if !limit.any_less(all) {
+                continue;
+            }
+            let most = h.like(self.scheme.most_damping / n as f64);
+            for j in 0..n {
+                let damping = -(self.by_state[(2 * n + 1) * j + n].get(simd, part) * h);
+                let share = most.if_less(damping, most / damping, h.like(1.0));
+                let share = limit.if_less(all, share, h.like(1.0));
+                for row in 0..n {
+                    let slope = &mut self.by_state[2 * n * row + n + j];
+                    slope.set(part, slope.get(simd, part) * share);
+                }
+            }
+        }
+    }
+
+    /// Move positions with the new velocities: q += h (v' - v), and the same for the sensitivities.
+    #[inline(always)]
+    fn move_with_new_velocities<S: Simd>(&mut self, simd: S, h: &Lane) {
+        let n = self.tangent.joints;
+        let columns = self
+            .now
+            .chunks_exact(2 * n)
+            .zip(self.sum.chunks_exact_mut(2 * n));
+        for (now, sum) in columns {
+            for part in 0..Lane::parts::<S>() {
+                for j in 0..n {
+                    let gain = sum[n + j].get(simd, part) - now[n + j].get(simd, part);
+                    let moved = gain.mul_add(h.get(simd, part), sum[j].get(simd, part));
+                    sum[j].set(part, moved);
+                }
+            }
+        }
+    }
+
+    /// Accumulate the slopes of a stage times their share of the step, and compute the states of the next.
+    #[inline(always)]
+    fn stage<S: Simd>(
+        &mut self,
+        simd: S,
+        is_first: bool,
+        is_last: bool,
+        weighed: &Lane,
+        reached: &Lane,
+    ) {
+        // With the number of joints known at compile time, the loops over rows are unrolled.
+        match self.tangent.joints {
+            1 => self.stage_of(simd, 1, is_first, is_last, weighed, reached),
+            2 => self.stage_of(simd, 2, is_first, is_last, weighed, reached),
+            n => self.stage_of(simd, n, is_first, is_last, weighed, reached),
+        }
+    }
+
+    #[inline(always)]
+    fn stage_of<S: Simd>(
+        &mut self,
+        simd: S,
+        n: usize,
+        is_first: bool,
+        is_last: bool,
+        weighed: &Lane,
+        reached: &Lane,
+    ) {
+        let rows = 2 * n;
+        let inner = if is_first { &self.now } else { &self.inner };
+        let columns = (self.now.chunks_exact(rows))
+            .zip(inner.chunks_exact(rows))
+            .zip(self.next.chunks_exact_mut(rows))
+            .zip(self.sum.chunks_exact_mut(rows));
+        let by_state = &self.by_state[..n * rows];
+        for (column, (((now, inner), next), sum)) in columns.enumerate() {
+            let direct = self.tangent.direct(column);
+            for part in 0..Lane::parts::<S>() {
+                let (weighed, reached) = (weighed.get(simd, part), reached.get(simd, part));
+                for row in 0..rows {
+                    let slope = if row < n {
+                        inner[n + row].get(simd, part)
+                    } else {
+                        let mut slope = match direct {
+                            Some(first) => self.tape.output(first + row - n).get(simd, part),
+                            None => weighed.like(0.0),
+                        };
+                        if column > 0 {
+                            for state in 0..rows {
+                                let by_state = by_state[(row - n) * rows + state].get(simd, part);
+                                slope = by_state.mul_add(inner[state].get(simd, part), slope);
+                            }
+                        }
+                        slope
+                    };
+                    let now = now[row].get(simd, part);
+                    let before = if is_first {
+                        now
+                    } else {
+                        sum[row].get(simd, part)
+                    };
+                    sum[row].set(part, slope.mul_add(weighed, before));
+                    if !is_last {
+                        next[row].set(part, slope.mul_add(reached, now));
+                    }
+                }
+            }
+        }
+    }
+}
+
+struct Advance<'a, 't> {
+    stepper: &'a mut TangentStepper<'t>,
+    time: Lane,
+    length: Lane,
+    substeps: usize,
+}
+
+impl WithSimd for Advance<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let n = self.stepper.tangent.joints;
+        #[allow(clippy::cast_precision_loss)] // few substeps
+        let h = Row(self.length.map(|length| length / self.substeps as f64));
+        for part in 0..self.substeps {
+            let (tau, slopes) = self.stepper.torque.part(n, part);
+            let inputs = self.stepper.tape.moving();
+            inputs[2 * n..3 * n].copy_from_slice(tau);
+            inputs[3 * n + 1..].copy_from_slice(slopes);
+            self.stepper.step(simd, &self.time, &h);
+            for lane in 0..LANES {
+                self.time[lane] += h[lane];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+
+    use super::{LANES, Local, Tangent, TangentStepper};
+    use crate::data::Joint;
+    use crate::lanes::Row;
+    use crate::model::{Dynamics, FittedEffect, Library};
+    use crate::sim::{Commands, Hold, Point, RK4, SCHEMES, Scheme, Simulator};
+
+    const HELD: [f64; 2] = [0.5, -1.5];
+
+    /// Compare the sensitivities after a hold of 0.1 s with differences of the scheme's own steps.
+    fn are_slopes(model: &Dynamics, start: [f64; 4], substeps: usize, scheme: &'static Scheme) {
+        let active: Vec<usize> = (0..model.parameters.len()).collect();
+        let tangent = Tangent::new(model, &active, Local::State);
+        let (time, tau) = ([0.0], HELD.map(|tau| vec![tau]));
+        let commands = Commands::new(model, &time, &tau);
+        let end = |values: &[f64], start: &[f64]| {
+            let mut simulator = Simulator::<1>::new(Point::new(model, values), scheme);
+            simulator.put(start);
+            let (held, from) = (HELD.map(|tau| Row([tau])), Row([0.2]));
+            simulator.advance(&Hold::lasting([&commands], &held, from, 0.1, substeps));
+            simulator.state.clone()
+        };
+        let values = model.values();
+        let mut stepper = TangentStepper::new(&tangent, &values, scheme);
+        stepper.start(&start.map(Row::splat));
+        let (held, from) = (HELD.map(Row::splat), Row::splat(0.2));
+        let hold = Hold::lasting([&commands; LANES], &held, from, 0.1, substeps);
+        stepper.advance(&hold);
+        for (row, state) in end(&values, &start).iter().enumerate() {
+            let off = (stepper.now[row][3] - state[0]).abs();
+            assert!(off < 1e-12, "{}, state {row}: {off}", scheme.name);
+        }
+        for column in 0..tangent.columns() {
+            let moved = |by: f64| {
+                let (mut values, mut start) = (values.clone(), start);
+                match values.get_mut(column) {
+                    Some(value) => *value += by,
+                    None => start[column - active.len()] += by,
+                }
+                end(&values, &start)
+            };
+            for (row, (after, before)) in moved(1e-6).iter().zip(&moved(-1e-6)).enumerate() {
+                let wanted = (after[0] - before[0]) / 2e-6;
+                let found = stepper.now[4 * (1 + column) + row][3];
+                assert!(
+                    (found - wanted).abs() < 1e-8 * wanted.abs().max(1.0),
+                    "{}, column {column}, state {row}: {found} {wanted}",
+                    scheme.name
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn sensitivities_are_the_slopes_of_every_schemes_steps() {
+        let acrobot = Library::built_in().model("acrobot").unwrap();
+        let model = acrobot.with_sign_widths(vec![0.0; 2]).dynamics();
+        for scheme in SCHEMES {
+            are_slopes(&model, [0.7, -0.4, 1.5, -2.0], 3, scheme);
+        }
+    }
+
+    /// Both joints come to rest within the width over which their friction reverses, in steps that are just short enough: the
+    /// rates of decay are some 270/s and 600/s.
+    #[test]
+    fn sensitivities_of_joints_that_come_to_rest_are_slopes_while_steps_are_stable() {
+        let library = Library::built_in();
+        let friction = library.effect("coulomb_friction").unwrap();
+        let on = |joint: usize| FittedEffect::absent(friction, Joint::at(joint));
+        let acrobot = library.model("acrobot").unwrap();
+        let model = acrobot.with_effects(vec![on(0), on(1)]);
+        let model = model.with_sign_widths(vec![0.02; 2]).dynamics();
+        let values = [acrobot.values(), vec![6.0, 6.0]].concat();
+        let model = model.with_values(values);
+        are_slopes(&model, [0.3, -0.2, 0.05, -0.06], 50, RK4);
+    }
+
+    /// Held by more friction than the torque that pulls at it, a joint moves by hardly anything; steps are too long to follow
+    /// how fast it comes to rest.
+    #[test]
+    fn sensitivities_of_a_joint_that_sticks_stay_small() {
+        let library = Library::built_in();
+        let friction =
+            FittedEffect::absent(library.effect("coulomb_friction").unwrap(), Joint::at(0));
+        let pendulum = library.model("pendulum").unwrap();
+        let model = pendulum.with_effects(vec![friction]);
+        let model = model.with_sign_widths(vec![2e-3]).dynamics();
+        let mut values = model.values();
+        *values.last_mut().unwrap() = 4.0;
+        let tangent = Tangent::new(&model, &[2], Local::State);
+        let mut stepper = TangentStepper::new(&tangent, &values, RK4);
+        stepper.start(&[0.0, 0.5].map(Row::splat));
+        let (time, tau) = ([0.0], [vec![1.0]]);
+        let commands = Commands::new(&model, &time, &tau);
+        let (held, from) = ([Row::splat(1.0)], Row::splat(0.0));
+        stepper.advance(&Hold::lasting([&commands; LANES], &held, from, 0.5, 250));
+        for column in 0..tangent.columns() {
+            let [angle, velocity] = [0, 1].map(|row| stepper.now[2 * (1 + column) + row][0]);
+            assert!(
+                angle.abs() < 1.1 && velocity.abs() < 0.1,
+                "{column}: {angle} {velocity}"
+            );
+        }
+    }
+}

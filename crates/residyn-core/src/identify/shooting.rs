@@ -1,0 +1,516 @@
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rayon::prelude::*;
+
+use super::balance::{Acting, Balance, Rows};
+use super::normal_equations::WindowTerms;
+use super::pack::Pack;
+use super::prior::Prior;
+use super::sensitivity::{LANES, Local, Tangent};
+use super::values::{Column, Values};
+use crate::data::{Log, half_width_s};
+use crate::model::{Dynamics, Model};
+use crate::sim::{Commands, Point, Window, cut, initial_state};
+
+/// Least squares over windows of logs.
+///
+/// By multiple shooting: in each window the model is integrated from a free start state and compared with the logged
+/// positions at every row; the start state is compared with what the rows around it tell. Or by the torques that the
+/// logged motion needs, beside those logged.
+///
+/// A copy shares the batches of windows and the smoothed rows with its original.
+#[derive(Clone)]
+pub struct Shooting<'l> {
+    pub logs: &'l [Log],
+    pub windows: Vec<Window>,
+    /// Standard deviation per joint: of the position noise in rad (or m), or of the torque in N m (or N).
+    pub noise: Vec<f64>,
+    measure: Measure,
+    prior: Prior,
+    /// The same logs cut into windows of other lengths, as far as these were asked for: shared by all copies.
+    cuts: Arc<Mutex<Vec<Cut>>>,
+}
+
+/// What the model is compared with, window by window.
+#[derive(Clone)]
+enum Measure {
+    Motion(Arc<Vec<Pack>>),
+    Torques {
+        /// One a log.
+        rows: Arc<Vec<Rows>>,
+        packs: Arc<Vec<Balance>>,
+    },
+}
+
+/// Logs in windows of one length.
+struct Cut {
+    length_s: f64,
+    windows: Vec<Window>,
+    measure: Measure,
+}
+
+impl<'l> Shooting<'l> {
+    /// # Panics
+    /// When `noise` has not one entry a joint of the logs.
+    pub fn new(logs: &'l [Log], windows: Vec<Window>, noise: &[f64]) -> Self {
+        let mut order: Vec<usize> = (0..windows.len()).collect();
+        // Windows of similar length share a pack, which keeps the padding small.
+        order.sort_by_key(|&w| windows[w].rows());
+        let half_widths = half_widths(logs);
+        let packs = order
+            .chunks(LANES)
+            .map(|chunk| Pack::new(logs, &windows, chunk, noise, &half_widths))
+            .collect();
+        Self {
+            logs,
+            windows,
+            noise: noise.to_vec(),
+            measure: Measure::Motion(Arc::new(packs)),
+            prior: Prior::default(),
+            cuts: Arc::default(),
+        }
+    }
+
+    /// The torques of the logged motion, for models compiled by
+    /// [`Model::smoothed_torque_balance`]. Windows in which no row is used are dropped. Friction reverses over the speeds
+    /// `sign_widths`.
+    ///
+    /// # Panics
+    /// When `noise` or `sign_widths` have not one entry a joint of the logs.
+    pub fn of_torques(
+        logs: &'l [Log],
+        windows: Vec<Window>,
+        noise: &[f64],
+        sign_widths: &[f64],
+    ) -> Self {
+        let rows = logs.par_iter().map(|log| Rows::of(log, sign_widths));
+        let rows = rows.collect();
+        Self::of_rows(logs, Arc::new(rows), windows, noise)
+    }
+
+    fn of_rows(
+        logs: &'l [Log],
+        rows: Arc<Vec<Rows>>,
+        mut windows: Vec<Window>,
+        noise: &[f64],
+    ) -> Self {
+        windows.retain(|window| {
+            !rows[window.log]
+                .within(&logs[window.log], window)
+                .is_empty()
+        });
+        let order: Vec<usize> = (0..windows.len()).collect();
+        let packs = order.chunks(LANES);
+        let packs = packs.map(|chunk| Balance::new(logs, &rows, &windows, chunk, noise));
+        Self {
+            logs,
+            noise: noise.to_vec(),
+            measure: Measure::Torques {
+                packs: Arc::new(packs.collect()),
+                rows,
+            },
+            windows,
+            prior: Prior::default(),
+            cuts: Arc::default(),
+        }
+    }
+
+    /// The logs cut into windows of this length in s; they are cut once, however often they are asked for.
+    #[must_use]
+    pub fn cut_into(&self, length_s: f64) -> Self {
+        let mut cuts = self.cuts.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = cuts.iter().find(|cut| cut.length_s == length_s) {
+            return Self {
+                windows: known.windows.clone(),
+                measure: known.measure.clone(),
+                ..self.clone()
+            };
+        }
+        let new = self.over(cut(self.logs, length_s));
+        cuts.push(Cut {
+            length_s,
+            windows: new.windows.clone(),
+            measure: new.measure.clone(),
+        });
+        new
+    }
+
+    /// Other windows of the same logs, of the same rig.
+    #[must_use]
+    pub fn over(&self, windows: Vec<Window>) -> Self {
+        self.with(windows, &self.noise)
+    }
+
+    /// The same windows, whose joints have another noise.
+    #[must_use]
+    pub fn with_noise(&self, noise: &[f64]) -> Self {
+        self.with(self.windows.clone(), noise)
+    }
+
+    fn with(&self, windows: Vec<Window>, noise: &[f64]) -> Self {
+        let mut other = match &self.measure {
+            Measure::Motion(_) => Self::new(self.logs, windows, noise),
+            Measure::Torques { rows, .. } => {
+                Self::of_rows(self.logs, Arc::clone(rows), windows, noise)
+            }
+        };
+        other.prior = self.prior.clone();
+        other
+    }
+
+    /// What is free in each window, where these are its values.
+    pub(super) fn local(&self, locals: &[Vec<f64>]) -> Local {
+        let states = 2 * self.noise.len();
+        match &self.measure {
+            Measure::Torques { .. } => Local::Nothing,
+            Measure::Motion(_) if locals.first().is_some_and(|l| l.len() > states) => {
+                Local::StateAndForce
+            }
+            Measure::Motion(_) => Local::State,
+        }
+    }
+
+    /// The same windows, of whose start states nothing is known.
+    #[must_use]
+    pub fn with_free_starts(mut self) -> Self {
+        if let Measure::Motion(packs) = &mut self.measure {
+            Arc::make_mut(packs).iter_mut().for_each(Pack::free_starts);
+        }
+        self
+    }
+
+    /// The same windows of a rig whose parameters are known to be of the size that is declared.
+    #[must_use]
+    pub fn near(mut self, declared: &Model) -> Self {
+        self.prior = Prior::near(declared);
+        self
+    }
+
+    /// The cost of free values that are not those declared.
+    pub(super) fn departure(&self, columns: &[Column], values: &Values) -> f64 {
+        (self.prior).cost(columns, values, self.residuals_of_a_window())
+    }
+
+    /// Its gradient and Gauss-Newton matrix.
+    pub(super) fn departure_terms(&self, columns: &[Column], values: &Values) -> WindowTerms {
+        (self.prior).terms(columns, values, self.residuals_of_a_window())
+    }
+
+    /// What is declared of bodies, as information on the free values, with what the departure costs.
+    pub(super) fn declared_bodies(&self, columns: &[Column], values: &Values) -> WindowTerms {
+        (self.prior).terms_of_bodies(columns, values, self.residuals_of_a_window())
+    }
+
+    /// So many residuals say as much as the declared values do: they are correlated, and a few windows overrule what is
+    /// declared. In a motion the joints depend on each other; torques of joints are off one by one.
+    #[allow(clippy::cast_precision_loss)] // some thousands
+    fn residuals_of_a_window(&self) -> f64 {
+        let residuals = match &self.measure {
+            Measure::Motion(_) => {
+                let rows: usize = self.windows.iter().map(Window::rows).sum();
+                rows * self.noise.len()
+            }
+            Measure::Torques { packs, .. } => packs.iter().map(Balance::rows).sum(),
+        };
+        residuals as f64 / self.windows.len().max(1) as f64
+    }
+
+    /// The same windows, integrated in substeps of at most `longest_s`.
+    #[must_use]
+    pub fn in_steps_of(mut self, longest_s: f64) -> Self {
+        if let Measure::Motion(packs) = &mut self.measure {
+            let packs = Arc::make_mut(packs).iter_mut();
+            packs.for_each(|pack| pack.cut(longest_s));
+        }
+        self
+    }
+
+    /// Initial guess of each window's start state, followed by `extra` zeros.
+    pub fn initial_locals(&self, extra: usize) -> Vec<Vec<f64>> {
+        if let Measure::Torques { .. } = self.measure {
+            return vec![Vec::new(); self.windows.len()];
+        }
+        let half_widths = half_widths(self.logs);
+        let guess = |window: &Window| {
+            let log = &self.logs[window.log];
+            let mut state = initial_state(log, half_widths[window.log], window.first)
+                .expect("cut() checks this");
+            state.resize(state.len() + extra, 0.0);
+            state
+        };
+        self.windows.iter().map(guess).collect()
+    }
+
+    /// Normalised residuals (model - log) / noise of every window: `[window][row * n + joint]`.
+    pub fn residuals(
+        &self,
+        dynamics: &Dynamics,
+        values: &Values,
+        locals: &[Vec<f64>],
+    ) -> Vec<Vec<f64>> {
+        let n = dynamics.joints;
+        let of_motion = |pack: &Pack, commands: &[Commands<'_>]| {
+            let mut all: Vec<(usize, Vec<f64>)> =
+                pack.windows.iter().map(|&w| (w, Vec::new())).collect();
+            pack.roll(dynamics, values, commands, locals, |row, q| {
+                for (lane, (window, residuals)) in all.iter_mut().enumerate() {
+                    if row < self.windows[*window].rows() {
+                        residuals.extend((0..n).map(|j| {
+                            (q[j][lane] - pack.q[row][j][lane]) * pack.weight[row][j][lane]
+                        }));
+                    }
+                }
+            });
+            all
+        };
+        let per_pack = self.per_pack(dynamics, values, of_motion, |pack, data| {
+            pack.residuals(dynamics, values, data)
+        });
+        let mut out = vec![Vec::new(); self.windows.len()];
+        for (window, residuals) in per_pack {
+            out[window] = residuals;
+        }
+        out
+    }
+
+    /// Root mean square of what a model leaves on each joint, in the unit of the noise.
+    pub fn left_by(&self, dynamics: &Dynamics, values: &Values, locals: &[Vec<f64>]) -> Vec<f64> {
+        let residuals = self.residuals(dynamics, values, locals);
+        let shares = deviations(&residuals, dynamics.joints);
+        let noise = self.noise.iter().zip(shares);
+        noise.map(|(noise, share)| noise * share).collect()
+    }
+
+    /// The Huber loss of each window at residual scale `scale`, and of its start state; infinite where the model diverges.
+    pub fn costs(
+        &self,
+        dynamics: &Dynamics,
+        values: &Values,
+        locals: &[Vec<f64>],
+        scale: f64,
+    ) -> Vec<f64> {
+        let per_pack = self.per_pack(
+            dynamics,
+            values,
+            |pack, commands| pack.costs(dynamics, values, commands, locals, scale),
+            |pack, data| pack.costs(dynamics, values, data, scale),
+        );
+        let mut out = vec![f64::INFINITY; self.windows.len()];
+        let finite = |(_, cost): &(usize, f64)| cost.is_finite();
+        for (window, cost) in per_pack.into_iter().filter(finite) {
+            out[window] = cost;
+        }
+        out
+    }
+
+    /// What each window gives, all packs at once.
+    fn per_pack<T: Send>(
+        &self,
+        dynamics: &Dynamics,
+        values: &Values,
+        of_motion: impl Fn(&Pack, &[Commands<'_>]) -> Vec<(usize, T)> + Sync,
+        of_torques: impl Fn(&Balance, (&[Rows], &Acting)) -> Vec<(usize, T)> + Sync,
+    ) -> Vec<(usize, T)> {
+        match &self.measure {
+            Measure::Motion(packs) => {
+                let commands = self.commands(dynamics, values);
+                let packs = packs.par_iter();
+                packs.flat_map(|pack| of_motion(pack, &commands)).collect()
+            }
+            Measure::Torques { rows, packs } => {
+                let acting = Acting::of(dynamics, values, self.logs, rows);
+                let packs = packs.par_iter();
+                packs
+                    .flat_map(|pack| of_torques(pack, (rows.as_slice(), &acting)))
+                    .collect()
+            }
+        }
+    }
+
+    /// The torques of each log as filtered by the model's delays and lags.
+    fn commands(&self, dynamics: &Dynamics, values: &Values) -> Vec<Commands<'l>> {
+        let of_log = |(index, log)| {
+            let point = Point::new(dynamics, values.of_log(index));
+            Commands::of_log(&point, log)
+        };
+        self.logs.iter().enumerate().map(of_log).collect()
+    }
+
+    /// Cost, gradient and Gauss-Newton matrix of each window.
+    pub(super) fn linearise(
+        &self,
+        dynamics: &Dynamics,
+        tangent: &Tangent,
+        values: &Values,
+        locals: &[Vec<f64>],
+        scale: f64,
+    ) -> Vec<WindowTerms> {
+        let mut all = self.per_pack(
+            dynamics,
+            values,
+            |pack, commands| pack.linearise(tangent, values, commands, locals, scale),
+            |pack, data| pack.linearise(tangent, values, data, scale),
+        );
+        all.sort_by_key(|(window, _)| *window);
+        all.into_iter().map(|(_, terms)| terms).collect()
+    }
+}
+
+/// Root mean square of each joint's residuals, `[window][row * joints + joint]`.
+fn deviations(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0_f64); joints];
+    for row in residuals
+        .iter()
+        .flat_map(|window| window.chunks_exact(joints))
+    {
+        for (sum, residual) in sums.iter_mut().zip(row) {
+            *sum = (sum.0 + residual * residual, sum.1 + 1.0);
+        }
+    }
+    let root = |(squares, rows): (f64, f64)| (squares / rows.max(1.0)).sqrt().max(1e-12);
+    sums.into_iter().map(root).collect()
+}
+
+/// Half width of the cubics that tell start states, in s, one a log.
+fn half_widths(logs: &[Log]) -> Vec<f64> {
+    let of_log = |log: &Log| half_width_s(log.median_step());
+    logs.iter().map(of_log).collect()
+}
+
+#[cfg(test)]
+mod tests {
+
+    use std::sync::Arc;
+
+    use super::{Measure, Pack, Shooting, Values};
+    use crate::data::{Joint, Log, Quantity};
+    use crate::identify::cut;
+    use crate::identify::sensitivity::{Local, Tangent};
+    use crate::model::{FittedEffect, Library};
+
+    /// Two seconds of an arbitrary motion and torque at 100 Hz.
+    fn log() -> Log {
+        let time: Vec<f64> = (0..200).map(|row| 0.01 * f64::from(row)).collect();
+        let column = |f: fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect::<Vec<f64>>()];
+        Log {
+            path: "some.csv".into(),
+            q: column(|t| 0.01 * (3.0 * t).sin()),
+            qd: column(|t| 0.03 * (3.0 * t).cos()),
+            tau: column(|t| (20.0 * t).sin() + (31.0 * t).cos()),
+            driven_by: Quantity::Torque,
+            masked: vec![Vec::new()],
+            filled: Vec::new(),
+            leave_out: Vec::new(),
+            notes: Vec::new(),
+            time,
+        }
+    }
+
+    fn packs(shooting: &Shooting<'_>) -> Arc<Vec<Pack>> {
+        match &shooting.measure {
+            Measure::Motion(packs) => Arc::clone(packs),
+            Measure::Torques { .. } => panic!("of a motion"),
+        }
+    }
+
+    #[test]
+    fn copies_share_their_windows_until_one_is_changed() {
+        let logs = [log()];
+        let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[0.05]);
+        let copy = shooting.clone();
+        assert!(Arc::ptr_eq(&packs(&shooting), &packs(&copy)));
+        let [first, again] = [&shooting, &copy].map(|of| of.cut_into(0.15));
+        assert_eq!(first.windows, cut(&logs, 0.15));
+        assert!(Arc::ptr_eq(&packs(&first), &packs(&again)));
+        let fine = copy.in_steps_of(1e-3);
+        assert!(!Arc::ptr_eq(&packs(&shooting), &packs(&fine)));
+    }
+
+    #[test]
+    fn gradients_of_torques_are_slopes_of_the_cost() {
+        let library = Library::built_in();
+        let effects = ["actuator_delay", "actuator_lag", "coulomb_friction"]
+            .map(|name| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0)));
+        let arm = library.model("acrobot").unwrap();
+        let model = arm.with_effects(effects.to_vec());
+        let model = model.smoothed_torque_balance().unwrap();
+        let mut log = log();
+        for channels in [&mut log.q, &mut log.qd, &mut log.tau] {
+            let second = channels[0].iter().map(|x| 0.7 * x + 0.1).collect();
+            channels.push(second);
+        }
+        log.masked.push(Vec::new());
+        let logs = [log];
+        let shooting = Shooting::of_torques(&logs, cut(&logs, 0.5), &[0.5, 0.2], &[0.01; 2]);
+        let locals = shooting.initial_locals(0);
+        let free = |k: &usize| !model.parameters[*k].fixed;
+        let active: Vec<usize> = (0..model.parameters.len()).filter(free).collect();
+        let tangent = Tangent::new(&model, &active, Local::Nothing);
+        let mut values = model.values();
+        let first = values.len() - 3;
+        values[first..].copy_from_slice(&[0.0073, 0.015, 0.1]);
+        let point = |values: &[f64]| Values {
+            common: values.to_vec(),
+            own: Vec::new(),
+        };
+        let cost = |values: &[f64]| -> f64 {
+            let costs = shooting.costs(&model, &point(values), &locals, 1.0);
+            costs.iter().sum()
+        };
+        let terms = shooting.linearise(&model, &tangent, &point(&values), &locals, 1.0);
+        assert!(terms.len() > 1);
+        for (column, k) in active.into_iter().enumerate() {
+            let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
+            let moved = |step: f64| {
+                let mut moved = values.clone();
+                moved[k] += step;
+                cost(&moved)
+            };
+            let wanted = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+            assert!(
+                (found - wanted).abs() < 1e-2 * wanted.abs().max(1e-6),
+                "{}: {found} {wanted}",
+                model.parameters[k].name
+            );
+        }
+    }
+
+    #[test]
+    fn gradients_by_effects_with_memory_are_slopes_of_the_cost() {
+        let library = Library::built_in();
+        let effects = ["actuator_delay", "actuator_lag", "backlash"]
+            .map(|name| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0)));
+        let pendulum = library.model("pendulum").unwrap();
+        let model = pendulum.with_effects(effects.to_vec()).dynamics();
+        let logs = [log()];
+        let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[0.05]);
+        for local in [Local::State, Local::StateAndForce] {
+            let locals = shooting.initial_locals(usize::from(local == Local::StateAndForce));
+            let tangent = Tangent::new(&model, &[1, 2, 3, 4], local);
+            for (delay, lag) in [(0.0, 0.0), (0.0073, 0.015)] {
+                let values = [15.0, 3.0, delay, lag, 0.01, 0.0];
+                let point = |values: &[f64]| Values {
+                    common: values.to_vec(),
+                    own: Vec::new(),
+                };
+                let cost = |values: &[f64]| -> f64 {
+                    shooting
+                        .costs(&model, &point(values), &locals, 1.0)
+                        .iter()
+                        .sum()
+                };
+                let terms = shooting.linearise(&model, &tangent, &point(&values), &locals, 1.0);
+                for (column, k) in [1, 2, 3, 4].into_iter().enumerate() {
+                    let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
+                    let mut moved = values;
+                    moved[k] += 1e-7;
+                    let wanted = (cost(&moved) - cost(&values)) / 1e-7;
+                    assert!(
+                        (found - wanted).abs() < 1e-4 * wanted.abs(),
+                        "{local:?}, parameter {k} at {delay}, {lag}: {found} {wanted}"
+                    );
+                }
+            }
+        }
+    }
+}

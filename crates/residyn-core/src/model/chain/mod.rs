@@ -1,0 +1,32 @@
+//! The mechanics of a serial chain of bodies: from a [`Chain`] to a model file ([`model_text`]), and back for a few kinds of
+//! mechanism (`recover`).
+//!
+//! A long chain is written as its bodies; its equations are then written as operations ([`Links`]). A short one is written
+//! in closed form: each entry of the mass matrix is linear in the physical parameters, with Fourier series in the angles as
+//! coefficients. In this form equal functions look the same, so that parameters which the motion determines only in
+//! combination are found and lumped (base parameters).
+
+mod base;
+mod bodies_text;
+mod body;
+mod closed_form;
+mod equations;
+mod formula;
+mod model_file;
+mod nearest;
+pub mod recover;
+mod recursive;
+mod series;
+mod spatial;
+mod values;
+mod weightless;
+
+pub use body::{Chain, Drivetrain, Follows, Joint, Servo, Spring};
+pub use model_file::model_text;
+pub use recover::{Recovered, recover};
+pub use recursive::{Body, Links, Place};
+pub use series::rounded;
+pub use spatial::{Inertia, Pose};
+pub use spatial::{fault, turn, with_z_along};
+pub use values::{ValuesError, added};
+pub use weightless::without_inertia;

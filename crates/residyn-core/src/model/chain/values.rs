@@ -1,0 +1,117 @@
+//! The bodies of a chain for other values in its model file.
+
+use thiserror::Error;
+
+use super::bodies_text::Bodies;
+use super::body::Chain;
+use super::closed_form::ClosedForm;
+use super::equations::Kind;
+use super::model_file::is_short;
+use super::nearest::{Sum, nearest};
+use super::spatial::Inertia;
+use crate::data;
+
+/// Why a chain has no bodies for the values of a model.
+#[derive(Debug, Error)]
+pub enum ValuesError {
+    #[error(
+        "the model has no parameter `{0}`: it was not made from this file; give the file that `residyn new` read, and the same last body"
+    )]
+    Missing(String),
+    #[error(
+        "no bodies have the model's values: the logs tell too little; fit to motion that moves all links more"
+    )]
+    NoBodies,
+}
+
+/// For each joint what has to be added to its inertia, in its frame, so that the parameters of the chain's model file have
+/// these values. Of a short chain, whose parameters are sums, the bodies are taken that are nearest to the chain's.
+///
+/// # Errors
+/// A parameter without a value, or sums that no bodies have.
+pub fn added(
+    chain: &Chain,
+    value: impl Fn(&str) -> Option<f64>,
+) -> Result<Vec<Inertia>, ValuesError> {
+    let value = |name: &str| value(name).ok_or_else(|| ValuesError::Missing(name.to_owned()));
+    let now = parts_of(chain);
+    let new = match is_short(chain) {
+        true => nearest(&now, &sums(chain, &now, value)?).ok_or(ValuesError::NoBodies)?,
+        false => {
+            let mut new = now.clone();
+            for (name, kind, joint) in Bodies(chain).parameters() {
+                new[joint][place(kind)] = value(&name)?;
+            }
+            new
+        }
+    };
+    let added = now.iter().zip(&new).map(|(now, new)| {
+        let size = now
+            .iter()
+            .chain(new)
+            .fold(0.0_f64, |most, part| most.max(part.abs()));
+        let added: [f64; 10] = std::array::from_fn(|k| match new[k] - now[k] {
+            rounding if rounding.abs() <= ROUNDING * size => 0.0,
+            added => added,
+        });
+        Inertia::of_parts(&added)
+    });
+    Ok(added.collect())
+}
+
+/// A difference that is rounding, relative to the largest part of a body.
+const ROUNDING: f64 = 1e-13;
+
+/// Mass, first moments and tensor of the body of each joint.
+fn parts_of(chain: &Chain) -> Vec<[f64; 10]> {
+    let parts = |joint: &super::body::Joint| {
+        let mut parts = [0.0; 10];
+        for kind in Kind::OF_BODY {
+            parts[place(kind)] = kind.value(joint);
+        }
+        parts
+    };
+    chain.joints.iter().map(parts).collect()
+}
+
+/// What the parameters of a short chain are sums of. A part that is zero in the file is none of them, and stays zero.
+fn sums(
+    chain: &Chain,
+    now: &[[f64; 10]],
+    value: impl Fn(&str) -> Result<f64, ValuesError>,
+) -> Result<Vec<Sum>, ValuesError> {
+    let closed = ClosedForm::of(chain);
+    let sum = |(name, parts): (&str, Vec<(f64, Kind, data::Joint)>)| {
+        let is_rotor = |(_, kind, _): &&(f64, Kind, data::Joint)| *kind == Kind::Rotor;
+        let rotors = parts.iter().filter(is_rotor);
+        let of_rotors: f64 = rotors
+            .map(|(factor, kind, joint)| factor * kind.value(&chain.joints[*joint]))
+            .sum();
+        let bodies = parts.iter().filter(|part| !is_rotor(part));
+        Ok(Sum {
+            parts: bodies
+                .map(|(factor, kind, joint)| (*factor, 10 * joint.index() + place(*kind)))
+                .collect(),
+            value: value(name)? - of_rotors,
+        })
+    };
+    let mut sums: Vec<Sum> = closed.sums().map(sum).collect::<Result<_, _>>()?;
+    let all = now.iter().flatten().enumerate();
+    let zero = all.filter(|(_, part)| **part == 0.0).map(|(at, _)| Sum {
+        parts: vec![(1.0, at)],
+        value: 0.0,
+    });
+    sums.extend(zero);
+    Ok(sums)
+}
+
+/// The place of a parameter among the parts of an inertia.
+fn place(kind: Kind) -> usize {
+    match kind {
+        Kind::Mass => 0,
+        Kind::Moment(axis) => 1 + axis,
+        Kind::Tensor(0, b) => 4 + b,
+        Kind::Tensor(a, b) => 5 + a + b,
+        Kind::Rotor => unreachable!("rotors belong to no body"),
+    }
+}

@@ -1,0 +1,122 @@
+//! What becomes of the commands of a rig that is not driven by torques: a servo with position targets, a motor under voltage.
+
+use std::sync::Arc;
+
+use super::assemble::lower;
+use super::reader::{Document, FileError, Located, Section};
+use super::system::{Equations, Model};
+use crate::data::{Joint, Log, Quantity};
+use crate::expr::{Formula, Graph, Node, Program, Scope};
+use crate::lanes::Row;
+
+/// The torque of each joint's drive, as formulas in the commands `cmd1..cmdn`, the measured motion `q1..`, `qd1..`, time `t` and
+/// the parameters of the model.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Drive(Vec<Located<Formula>>);
+
+impl Drive {
+    /// The table `[drive]`: one formula a joint, `tau1` to `taun`.
+    pub fn read(
+        document: &Document,
+        section: &Section<'_>,
+        joints: usize,
+    ) -> Result<Self, FileError> {
+        let names: Vec<String> = Joint::all(joints).map(|joint| joint.name("tau")).collect();
+        section.only(&names.iter().map(String::as_str).collect::<Vec<_>>())?;
+        let formula = |name: &String| {
+            let text = section.text(name)?;
+            let text = text.ok_or_else(|| {
+                let message = format!(
+                    "`{name}` is missing in [drive]; a joint whose command is its torque has {name} = \"{}\"",
+                    name.replace("tau", "cmd")
+                );
+                section.error(message)
+            })?;
+            document.formula(&text)
+        };
+        names
+            .iter()
+            .map(formula)
+            .collect::<Result<_, _>>()
+            .map(Self)
+    }
+
+    pub fn formulas(&self) -> &[Located<Formula>] {
+        &self.0
+    }
+
+    /// The torques, in a scope that has the names they may mention.
+    pub fn torques(&self, graph: &mut Graph, scope: &Scope) -> Vec<Node> {
+        let formulas = self.0.iter();
+        formulas
+            .map(|formula| lower(scope, graph, formula))
+            .collect()
+    }
+}
+
+impl Model {
+    /// What the rig is driven by: torques, or commands of which `[drive]` makes torques.
+    pub fn driven_by(&self) -> Quantity {
+        match self.equations.drive {
+            None => Quantity::Torque,
+            Some(_) => Quantity::Command,
+        }
+    }
+
+    /// The names that formulas of `[drive]` may use, in the order of a compiled model's inputs.
+    pub(super) fn drive_names(&self) -> Vec<String> {
+        let stems = ["q", "qd", Quantity::Command.key()];
+        let of_stem = |stem| Joint::all(self.joints).map(move |joint| joint.name(stem));
+        let states = stems.into_iter().flat_map(of_stem);
+        let parameters = self.parameters.iter().map(|p| p.name.clone());
+        states.chain(["t".to_owned()]).chain(parameters).collect()
+    }
+
+    /// The torques of the drives along a log (`[joint][row]`, N m or N), at the declared values, before any effect; what the
+    /// log holds where it holds torques.
+    pub fn drive_torques(&self, log: &Log) -> Vec<Vec<f64>> {
+        let Some(program) = self.drive_program() else {
+            return log.tau.clone();
+        };
+        let mut torques = vec![Vec::with_capacity(log.rows()); self.joints];
+        let channels = || (log.q.iter().chain(&log.qd).chain(&log.tau)).chain([&log.time]);
+        let moving = channels().count();
+        let mut tape = program.tape_with_held::<f64, 1>(moving);
+        let values = self.parameters.iter().map(|parameter| parameter.value);
+        for (slot, value) in tape.inputs()[moving..].iter_mut().zip(values) {
+            *slot = Row([value]);
+        }
+        for row in 0..log.rows() {
+            for (slot, channel) in tape.moving().iter_mut().zip(channels()) {
+                *slot = Row([channel[row]]);
+            }
+            tape.run();
+            for (joint, torques) in torques.iter_mut().enumerate() {
+                torques.push(tape.output(joint)[0]);
+            }
+        }
+        torques
+    }
+
+    /// The same equations, driven by torques.
+    pub fn without_drive(&self) -> Self {
+        let equations = Equations {
+            drive: None,
+            ..(*self.equations).clone()
+        };
+        Self {
+            equations: Arc::new(equations),
+            ..self.clone()
+        }
+    }
+
+    /// The torques of the drives as a program of its command, state, time and parameters.
+    pub fn drive_program(&self) -> Option<Program> {
+        let drive = self.equations.drive.as_ref()?;
+        let mut graph = Graph::new();
+        let names = self.drive_names();
+        let scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
+        let torques = drive.torques(&mut graph, &scope);
+        Some(graph.finish(&torques))
+    }
+}

@@ -1,0 +1,46 @@
+use thiserror::Error;
+
+use crate::data::Joint;
+
+/// Why a model cannot be put together as asked.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ModelError {
+    /// No effect has this name.
+    #[error("unknown effect `{name}`{near}; `residyn list effects` shows all")]
+    UnknownEffect {
+        name: String,
+        /// A similar known name, as the end of a sentence; empty without one.
+        near: String,
+    },
+    /// No drive has this name.
+    #[error("unknown drive `{name}`{near}; `residyn list drives` shows all")]
+    UnknownDrive {
+        name: String,
+        /// A similar known name, as the end of a sentence; empty without one.
+        near: String,
+    },
+    /// The effect acts on a first joint that turns.
+    #[error("`{effect}` acts on the first joint, where that turns")]
+    FirstJointOnly { effect: String },
+    /// The effect acts on the last joint of a chain of bodies.
+    #[error("`{effect}` acts on the last joint of a chain of bodies")]
+    LastJointOnly { effect: String },
+    /// The effect acts on two neighbouring joints of one kind.
+    #[error("`{effect}` acts on two joints in a row that both turn or both slide")]
+    NeighboursOfOneKind { effect: String },
+    /// The effect is a part of the inertia, which the model does not state.
+    #[error("`{effect}` needs a model that gives `mass` and `bias`; {model} gives accelerations")]
+    NeedsMass { effect: String, model: String },
+    /// The model has this effect, or one that excludes it, on the joint.
+    #[error("`{effect}` acts on joint {joint} already")]
+    Twice { effect: String, joint: Joint },
+    /// A parameter has a value outside of its bounds.
+    #[error("`{effect}`: {parameter} = {value} lies outside of {low} to {high}")]
+    OutOfBounds {
+        effect: String,
+        parameter: String,
+        value: f64,
+        low: f64,
+        high: f64,
+    },
+}

@@ -1,0 +1,188 @@
+//! A model file, read whole and checked.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::columns_in_file::columns;
+use super::drive::Drive;
+use super::effect::Effect;
+use super::reader::{Document, FileError, Located, Section};
+use super::system::{Equations, Model, Motion};
+use super::{chain_in_file, effects_in_file, sections};
+use crate::data::{Joint, Quantity};
+use crate::expr::{Formula, Graph, Scope, parse};
+
+impl Model {
+    /// The model in `text`; `path` is for messages.
+    ///
+    /// # Errors
+    /// Unknown or missing key, formula error, unknown effect: with line, column and remedy.
+    pub fn from_text(path: &Path, text: &str, library: &[Effect]) -> Result<Self, FileError> {
+        Self::from_document(&Document::new(path, text), library)
+    }
+
+    fn from_document(document: &Document, library: &[Effect]) -> Result<Self, FileError> {
+        let top = document.parse()?;
+        top.only(&[
+            "system",
+            "columns",
+            "drive",
+            "parameters",
+            "dynamics",
+            "chain",
+            "energy",
+            "residual",
+            "effect",
+        ])?;
+        let section = top.required_section("system")?;
+        section.only(sections::SYSTEM_KEYS)?;
+        let joints = sections::joints(&section)?;
+        let joint_names = sections::joint_names(&section, joints)?;
+        let drive = top.section("drive")?;
+        let driven_by = match drive {
+            None => Quantity::Torque,
+            Some(_) => Quantity::Command,
+        };
+        let prismatic = sections::prismatic(&section, joints)?;
+        let system = Self {
+            name: section.required_text("name")?.value,
+            about: section.text_or_empty("about")?,
+            joints,
+            sign_width: sections::sign_width(&section, joints)?,
+            columns: columns(top.section("columns")?, joints, driven_by, &joint_names)?,
+            joint_names,
+            parameters: sections::parameters(top.section("parameters")?)?,
+            effects: effects_in_file::read(&top, joints, library)?,
+            hidden: sections::hidden(top.section("residual")?, joints)?,
+            text: document.text.clone(),
+            declaration: sections::declaration(document)?,
+            equations: Arc::new(Equations {
+                lets: sections::lets(document, &top)?,
+                motion: motion(document, &top, &prismatic)?,
+                energy: sections::energy(top.section("energy")?)?,
+                drive: drive
+                    .map(|section| Drive::read(document, &section, joints))
+                    .transpose()?,
+            }),
+            prismatic,
+        };
+        system.check_names(&top)?;
+        system.check_formulas(document)?;
+        for (k, section) in top.sections("effect")?.iter().enumerate() {
+            let (present, rest) = system.effects.split_at(k);
+            let check = system.check_effect(&rest[0], present);
+            check.map_err(|refused| section.error(refused.to_string()))?;
+        }
+        Ok(system)
+    }
+
+    /// Parameters and intermediates must not take the names of states, torques or each other.
+    fn check_names(&self, top: &Section<'_>) -> Result<(), FileError> {
+        let mut taken: Vec<String> = self.input_names();
+        taken.truncate(3 * self.joints + 1);
+        taken.extend(Joint::all(self.joints).map(|joint| joint.name(Quantity::Command.key())));
+        let parameters = self.parameters.iter().map(|p| ("parameters", &p.name));
+        let lets = self
+            .equations
+            .lets
+            .iter()
+            .map(|(name, _)| ("dynamics", name));
+        for (section, name) in parameters.chain(lets) {
+            let fault = if !parse(name).is_ok_and(|formula| formula.is_name(name)) {
+                "is none that formulas can use; take letters, digits and _"
+            } else if taken.contains(name) {
+                "is taken; choose another"
+            } else {
+                taken.push(name.clone());
+                continue;
+            };
+            let section = top.required_section(section)?;
+            return Err(section.error_at(name, format!("the name `{name}` {fault}")));
+        }
+        Ok(())
+    }
+
+    /// Lower every formula once, so that a wrong name is met here, with its place.
+    fn check_formulas(&self, document: &Document) -> Result<(), FileError> {
+        let mut graph = Graph::new();
+        let mut names = self.input_names();
+        if matches!(self.equations.motion, Motion::Chain(_)) {
+            // Bodies stay what they are while they move.
+            names.drain(..=3 * self.joints);
+        }
+        let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
+        let mut lower = |scope: &Scope, formula: &Located<Formula>| {
+            scope
+                .lower(&mut graph, &formula.value)
+                .map_err(|error| document.formula_error(formula.at, &error))
+        };
+        let lets = &self.equations.lets;
+        for (k, (name, formula)) in lets.iter().enumerate() {
+            let mut later = lets[k..].iter().map(|(later, _)| later.as_str());
+            if let Some(later) = later.find(|later| formula.value.names().contains(later)) {
+                let told = match circle(lets, name, later) {
+                    Some(circle) => format!(
+                        "`{name}` is defined by itself: {circle}; write one of these without the next"
+                    ),
+                    None => {
+                        format!("`{name}` uses `{later}`, which is defined after it; move it up")
+                    }
+                };
+                return Err(document.error(formula.at, told));
+            }
+            let node = lower(&scope, formula)?;
+            scope.bind(name, node);
+        }
+        let energy = self
+            .equations
+            .energy
+            .iter()
+            .flat_map(|energy| [&energy.total, &energy.power]);
+        for formula in self.equations.motion.formulas().chain(energy) {
+            lower(&scope, formula)?;
+        }
+        let names = self.drive_names();
+        let scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
+        for formula in self.equations.drive.iter().flat_map(Drive::formulas) {
+            let lowered = scope.lower(&mut graph, &formula.value);
+            lowered.map_err(|error| document.formula_error(formula.at, &error))?;
+        }
+        Ok(())
+    }
+}
+
+/// `a -> b -> a`: how the intermediate `name` uses itself by way of `next`, if it does.
+fn circle(lets: &[(String, Located<Formula>)], name: &str, next: &str) -> Option<String> {
+    let mut users = HashMap::from([(next, name)]);
+    let mut open = vec![next];
+    while let Some(at) = open.pop() {
+        if at == name {
+            let back = std::iter::successors(Some(users[name]), |at| Some(users[at]));
+            let mut between: Vec<&str> = back.take_while(|at| *at != name).collect();
+            between.reverse();
+            return Some([&[name], between.as_slice(), &[name]].concat().join(" -> "));
+        }
+        let formula = lets.iter().find(|(own, _)| own == at);
+        for used in formula.map_or_else(Vec::new, |(_, formula)| formula.value.names()) {
+            users.entry(used).or_insert_with(|| {
+                open.push(used);
+                at
+            });
+        }
+    }
+    None
+}
+
+/// Equations of motion by formulas, or those of a chain of bodies.
+fn motion(document: &Document, top: &Section<'_>, prismatic: &[bool]) -> Result<Motion, FileError> {
+    let Some(chain) = top.section("chain")? else {
+        let dynamics = top.required_section("dynamics")?;
+        return sections::motion(document, &dynamics, prismatic.len());
+    };
+    if let Some(dynamics) = top.section("dynamics")? {
+        dynamics.only(&["let"])?;
+    }
+    let bodies = chain_in_file::chain(document, &chain, prismatic)?;
+    Ok(Motion::Chain(Box::new(bodies)))
+}

@@ -1,0 +1,50 @@
+//! Dynamics models: the file format, the library of effects, and the assembly of equations and effects into one program.
+
+mod assemble;
+mod bodies;
+mod call;
+pub mod chain;
+mod chain_in_file;
+pub mod check;
+mod columns_in_file;
+mod drive;
+mod dynamics;
+mod effect;
+mod effect_file;
+mod effects_in_file;
+mod error;
+mod fade;
+mod file;
+mod filter;
+mod fitted;
+mod library;
+mod network;
+mod reader;
+mod ready_drive;
+mod residual;
+mod saved;
+mod sections;
+mod shift;
+mod system;
+mod typeset;
+pub mod weights;
+mod written;
+
+pub use call::{Call, InputFile};
+pub use dynamics::{Dynamics, OwnValue, Parameter};
+pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
+pub use error::ModelError;
+pub use filter::{CommandFilter, Filter};
+pub use fitted::{FittedEffect, Status};
+pub use library::Library;
+pub use network::to_f32;
+pub use network::{
+    Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,
+    ResidualOn,
+};
+pub use reader::{FileError, FileRemedy};
+pub use ready_drive::ReadyDrive;
+pub use residual::nothing_but;
+pub use residual::with_residual;
+pub use saved::{ModelShape, ModelWeights, Origin, SavedModelError, SavedNetwork, SavedParameter};
+pub use system::Model;

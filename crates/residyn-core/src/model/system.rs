@@ -1,0 +1,411 @@
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::bodies::Bodies;
+use super::chain::{Body, Recovered};
+use super::drive::Drive;
+use super::dynamics::{Dynamics, OwnValue, Parameter};
+use super::effect::{Effect, Entry, Measure};
+use super::error::ModelError;
+use super::fitted::FittedEffect;
+use super::reader::Located;
+use crate::data::{Columns, Joint, Log, LogError};
+use crate::expr::{Formula, Graph, Node, Scope, SignForm};
+
+/// Speed over which dry friction reverses (rad/s or m/s), unless the file or a fit to logs sets another one.
+const DEFAULT_SIGN_WIDTH: f64 = 0.01;
+
+/// How a model file states the motion.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Motion {
+    /// qdd = ..., one formula a joint.
+    Accelerations(Vec<Located<Formula>>),
+    /// mass(q) qdd + bias(q, qd) = tau.
+    MassAndBias {
+        mass: Vec<Vec<Located<Formula>>>,
+        bias: Vec<Located<Formula>>,
+    },
+    /// The same, of a chain of bodies.
+    Chain(Box<Bodies>),
+}
+
+/// The balance of energy and work: d(total)/dt = power along every motion.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Energy {
+    pub total: Located<Formula>,
+    pub power: Located<Formula>,
+}
+
+/// The declared equations of motion, checked. Models that differ in values or effects share them.
+#[derive(Debug, Clone)]
+pub(super) struct Equations {
+    pub lets: Vec<(String, Located<Formula>)>,
+    pub motion: Motion,
+    pub energy: Option<Energy>,
+    /// What makes the torques, where commands do.
+    pub drive: Option<Drive>,
+}
+
+/// A model: declared equations, effects on their joints, the values of all parameters and the smoothing of friction.
+///
+/// It is what a model file holds, what a fit returns and what is compiled for everything that runs it: see
+/// [`Model::dynamics`].
+#[derive(Debug, Clone)]
+pub struct Model {
+    pub name: String,
+    pub about: String,
+    pub joints: usize,
+    /// As a URDF or the rig calls the joints; empty where they have numbers alone.
+    pub joint_names: Vec<String>,
+    /// For each joint whether it slides (m, N) rather than turns (rad, N m).
+    pub prismatic: Vec<bool>,
+    /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump. `None` if the file sets none:
+    /// then fits choose it by the speeds in the logs.
+    pub sign_width: Option<Vec<f64>>,
+    pub columns: Columns,
+    pub parameters: Vec<Parameter>,
+    pub effects: Vec<FittedEffect>,
+    /// Widths of the hidden layers of the residual MLP.
+    pub hidden: Vec<usize>,
+    /// The text of the file.
+    pub text: String,
+    /// The text of the declared part of the file: everything but the effects.
+    pub declaration: String,
+    pub(super) equations: Arc<Equations>,
+}
+
+impl Model {
+    /// The log that a file with these columns, in memory, is; `name` is for messages and for the report.
+    ///
+    /// # Errors
+    /// Columns that lack a name or a number.
+    pub fn log_from_columns(
+        &self,
+        name: &str,
+        columns: impl IntoIterator<Item = (String, Vec<f64>)>,
+    ) -> Result<Log, LogError> {
+        Log::from_columns(name, columns, Some((self.joints, &self.columns)))
+    }
+
+    /// Names that effects must not take: of parameters and of intermediates.
+    pub(super) fn own_names(&self) -> impl Iterator<Item = &str> {
+        let lets = self.equations.lets.iter().map(|(name, _)| name.as_str());
+        self.parameters.iter().map(|p| p.name.as_str()).chain(lets)
+    }
+
+    /// A joint for people: `2`, or `2 (elbow)` where it has a name.
+    pub fn joint_label(&self, joint: Joint) -> String {
+        joint.called(self.joint_names.get(joint.index()).map(String::as_str))
+    }
+
+    /// The names that formulas of the motion may use before any `let`: states, torques, time, parameters.
+    pub fn input_names(&self) -> Vec<String> {
+        let numbered = |stem: &str| {
+            (1..=self.joints)
+                .map(move |j| format!("{stem}{j}"))
+                .collect::<Vec<_>>()
+        };
+        let mut names = [numbered("q"), numbered("qd"), numbered("tau")].concat();
+        names.push("t".into());
+        names.extend(self.parameters.iter().map(|p| p.name.clone()));
+        names
+    }
+
+    /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump.
+    pub fn sign_widths(&self) -> Vec<f64> {
+        let default = || vec![DEFAULT_SIGN_WIDTH; self.joints];
+        self.sign_width.clone().unwrap_or_else(default)
+    }
+
+    /// How dry friction is written in each joint.
+    pub(super) fn sign(&self) -> Vec<SignForm> {
+        let form = |width: f64| match width {
+            0.0 => SignForm::Exact,
+            width => SignForm::Smooth { width },
+        };
+        self.sign_widths().into_iter().map(form).collect()
+    }
+
+    /// The same model with these effects in place of its own.
+    #[must_use]
+    pub fn with_effects(&self, effects: Vec<FittedEffect>) -> Self {
+        Self {
+            effects,
+            ..self.clone()
+        }
+    }
+
+    /// The same model with dry friction that reverses over these speeds (rad/s or m/s), one per joint; 0 for a jump.
+    ///
+    /// # Panics
+    /// When there is not one width a joint.
+    #[must_use]
+    pub fn with_sign_widths(&self, widths: Vec<f64>) -> Self {
+        assert_eq!(widths.len(), self.joints, "one width for each joint");
+        Self {
+            sign_width: Some(widths),
+            ..self.clone()
+        }
+    }
+
+    /// Values of all parameters: the declared ones, then those of the effects, in their order.
+    pub fn values(&self) -> Vec<f64> {
+        let declared = self.parameters.iter().map(|p| p.value);
+        let of_effects = self.effects.iter().flat_map(|effect| &effect.values);
+        declared
+            .chain(of_effects.map(|(value, _)| *value))
+            .collect()
+    }
+
+    /// The value of a parameter, by its index among all; in a log, the one that it has there.
+    pub fn value_of(&self, parameter: usize, log: Option<&Log>) -> f64 {
+        let in_log = |own: &OwnValue| log.is_some_and(|log| log.is_called(&own.log));
+        let own = self.own_values().into_iter();
+        let mut own = own.filter(|own| own.parameter == parameter);
+        own.find(in_log)
+            .map_or_else(|| self.values()[parameter], |own| own.value)
+    }
+
+    /// The same model with the values of a compiled form of it, those in single logs included. Intervals are dropped,
+    /// since they belong to other values.
+    ///
+    /// # Panics
+    /// If `compiled` has another number of parameters.
+    #[must_use]
+    pub fn at(&self, compiled: &Dynamics) -> Self {
+        let mut model = self.clone();
+        let slots = model.slots();
+        assert_eq!(
+            slots.len(),
+            compiled.parameters.len(),
+            "one value for each parameter"
+        );
+        for ((value, interval), parameter) in slots.into_iter().zip(&compiled.parameters) {
+            (*value, *interval) = (parameter.value, None);
+        }
+        for k in 0..model.effects.len() {
+            let place = self.place_of(k);
+            let of_effect = |own: &&OwnValue| place.contains(&own.parameter);
+            let own = compiled.own.iter().filter(of_effect).map(|own| OwnValue {
+                parameter: own.parameter - place.start,
+                ..own.clone()
+            });
+            model.effects[k].own = own.collect();
+        }
+        model
+    }
+
+    /// Set the interval of a parameter's value, or of its value in one log, by its half width; the parameter's bounds cut
+    /// it.
+    pub fn set_half_width(&mut self, parameter: usize, log: Option<&Log>, half: f64) {
+        let [low, high] = self.all_parameters()[parameter].bounds;
+        let around = |value: f64| Some([(value - half).max(low), (value + half).min(high)]);
+        let Some(log) = log else {
+            let (value, interval) = self.slots().swap_remove(parameter);
+            *interval = around(*value);
+            return;
+        };
+        let Some(k) = (0..self.effects.len()).find(|k| self.place_of(*k).contains(&parameter))
+        else {
+            return;
+        };
+        let first = self.place_of(k).start;
+        let mut own = self.effects[k].own.iter_mut();
+        let is_it =
+            |own: &&mut OwnValue| own.parameter == parameter - first && log.is_called(&own.log);
+        if let Some(own) = own.find(is_it) {
+            own.ci95 = around(own.value);
+        }
+    }
+
+    /// Value and interval of every parameter.
+    fn slots(&mut self) -> Vec<(&mut f64, &mut Option<[f64; 2]>)> {
+        let declared = self
+            .parameters
+            .iter_mut()
+            .map(|p| (&mut p.value, &mut p.ci95));
+        let of_effects = self
+            .effects
+            .iter_mut()
+            .flat_map(|effect| &mut effect.values);
+        declared
+            .chain(of_effects.map(|(value, ci95)| (value, ci95)))
+            .collect()
+    }
+
+    /// Indices of the parameters of the k-th effect among all.
+    pub fn place_of(&self, k: usize) -> Range<usize> {
+        let before = self.effects[..k].iter().map(|effect| effect.values.len());
+        let first = self.parameters.len() + before.sum::<usize>();
+        first..first + self.effects[k].values.len()
+    }
+
+    /// Each effect with the indices of its parameters among all.
+    pub(super) fn placed(&self) -> impl Iterator<Item = (&FittedEffect, Range<usize>)> {
+        let places = (0..self.effects.len()).map(|k| self.place_of(k));
+        self.effects.iter().zip(places)
+    }
+
+    /// Whether an effect can act on a joint of this system.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn can_carry(&self, effect: &Effect, joint: Joint) -> Result<(), ModelError> {
+        let name = || effect.name.clone();
+        if effect.first_joint_only && (joint.index() > 0 || self.prismatic[joint]) {
+            return Err(ModelError::FirstJointOnly { effect: name() });
+        }
+        match effect.entry {
+            Entry::Payload(_) if !self.carries_at(joint) => {
+                Err(ModelError::LastJointOnly { effect: name() })
+            }
+            Entry::Coupling(_) if !self.couples(joint) => {
+                Err(ModelError::NeighboursOfOneKind { effect: name() })
+            }
+            Entry::Inertia(_) | Entry::Coupling(_) if !self.has_mass_matrix() => {
+                Err(ModelError::NeedsMass {
+                    effect: name(),
+                    model: self.name.clone(),
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether the joint moves the tip of a chain of bodies.
+    fn carries_at(&self, joint: Joint) -> bool {
+        matches!(self.equations.motion, Motion::Chain(_)) && !joint.next().is_of(self.joints)
+    }
+
+    /// Whether a joint and the next one have coordinates of one kind.
+    fn couples(&self, joint: Joint) -> bool {
+        let next = joint.next();
+        next.is_of(self.joints) && self.prismatic[joint] == self.prismatic[next]
+    }
+
+    /// Whether an effect with its values can join `present` ones.
+    ///
+    /// # Errors
+    /// Why not: see [`Model::can_carry`], a value outside of its bounds, or the same effect twice.
+    pub fn check_effect(
+        &self,
+        new: &FittedEffect,
+        present: &[FittedEffect],
+    ) -> Result<(), ModelError> {
+        self.can_carry(&new.effect, new.joint)?;
+        let mut others = present.iter();
+        if let Some(old) = others.find(|old| old.excludes(new)) {
+            return Err(ModelError::Twice {
+                effect: old.effect.name.clone(),
+                joint: new.joint,
+            });
+        }
+        let common = (0..).zip(new.values.iter().map(|(value, _)| value));
+        let own = new.own.iter().map(|own| (own.parameter, &own.value));
+        for (k, value) in common.chain(own) {
+            let parameter = &new.effect.parameters[k];
+            let [low, high] = parameter.bounds;
+            // Bounds that are multiples of what logs show cannot be checked before there are logs.
+            if parameter.measure == Measure::One && !(low..=high).contains(value) {
+                return Err(ModelError::OutOfBounds {
+                    effect: new.effect.name.clone(),
+                    parameter: parameter.name.clone(),
+                    value: *value,
+                    low,
+                    high,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the file gives mass matrix and bias, which effects of the inertia need.
+    pub fn has_mass_matrix(&self) -> bool {
+        !matches!(self.equations.motion, Motion::Accelerations(_))
+    }
+
+    /// Total energy and the power of the torques as a program of the inputs of a compiled model, where the file
+    /// states them or its equations are those of a chain: `[total, power, d total/dq.., d total/dqd..]`.
+    pub fn energy_program(&self) -> Option<crate::expr::Program> {
+        let mut graph = Graph::new();
+        let names = match self.equations.drive {
+            None => self.input_names(),
+            Some(_) => self.drive_names(),
+        };
+        let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
+        if let Some(drive) = &self.equations.drive {
+            let torques = drive.torques(&mut graph, &scope);
+            for (joint, torque) in Joint::all(self.joints).zip(torques) {
+                scope.bind(&joint.name("tau"), torque);
+            }
+        }
+        let states = names[..2 * self.joints].iter();
+        let states: Vec<Node> = states.filter_map(|name| scope.get(name)).collect();
+        let mut lower = |scope: &Scope, formula: &Located<Formula>| {
+            scope
+                .lower(&mut graph, &formula.value)
+                .expect("formulas were checked when the file was read")
+        };
+        for (name, formula) in &self.equations.lets {
+            let node = lower(&scope, formula);
+            scope.bind(name, node);
+        }
+        let (total, power) = match (&self.equations.energy, &self.equations.motion) {
+            (Some(energy), _) => (lower(&scope, &energy.total), lower(&scope, &energy.power)),
+            (None, Motion::Chain(bodies)) => bodies.energy(&mut graph, &scope),
+            _ => return None,
+        };
+        let one = graph.constant(1.0);
+        let slopes = graph.gradient(&[total], &[one], &states);
+        Some(graph.finish(&[&[total, power], slopes.as_slice()].concat()))
+    }
+}
+
+impl Model {
+    /// The parameters of each body of a chain whose ten parts are parameters as they are: mass, first moments, and xx, xy, xz,
+    /// yy, yz, zz of the tensor.
+    pub fn inertias(&self) -> Vec<[usize; 10]> {
+        let Motion::Chain(bodies) = &self.equations.motion else {
+            return Vec::new();
+        };
+        let place = |formula: &Located<Formula>| {
+            let mut parameters = self.parameters.iter();
+            parameters.position(|parameter| formula.value.is_name(&parameter.name))
+        };
+        let body = |body: &Body<Located<Formula>>| -> Option<[usize; 10]> {
+            let places: Option<Vec<usize>> = body.parts().map(place).collect();
+            places?.try_into().ok()
+        };
+        bodies.bodies.iter().filter_map(body).collect()
+    }
+
+    /// The bodies that the file describes, where it describes a chain, at other values of the declared parameters.
+    pub fn mechanism(&self, values: &[f64]) -> Option<Recovered> {
+        let Motion::Chain(bodies) = &self.equations.motion else {
+            return None;
+        };
+        let mut graph = Graph::new();
+        let names = self.parameters.iter().map(|p| p.name.as_str());
+        let mut scope = Scope::of_inputs(&mut graph, names);
+        for (name, formula) in &self.equations.lets {
+            let node = scope.lower(&mut graph, &formula.value);
+            scope.bind(
+                name,
+                node.expect("formulas were checked when the file was read"),
+            );
+        }
+        let nodes = bodies.constants(&mut graph, &scope);
+        let numbers = graph.finish(&nodes).eval(&values[..self.parameters.len()]);
+        Some(bodies.mechanism(&numbers))
+    }
+}
+
+impl Motion {
+    pub(super) fn formulas(&self) -> Box<dyn Iterator<Item = &Located<Formula>> + '_> {
+        match self {
+            Self::Accelerations(formulas) => Box::new(formulas.iter()),
+            Self::MassAndBias { mass, bias } => Box::new(mass.iter().flatten().chain(bias)),
+            Self::Chain(bodies) => Box::new(bodies.formulas()),
+        }
+    }
+}

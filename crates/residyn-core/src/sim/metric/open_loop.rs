@@ -1,0 +1,271 @@
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+
+use super::assessment::{Assessment, OpenLoop, WindowError};
+use super::summary::{Summary, summarise};
+use crate::data::{Log, SAME_S, half_width_s, row_after, row_from};
+use crate::lanes::Row;
+use crate::model::Dynamics;
+use crate::sim::{
+    Commands, PREDICTION_S, Point, RK4, Simulator, Window, initial_state, with_own_angles,
+};
+
+/// Windows that are integrated side by side.
+const LANES: usize = 8;
+/// A prediction whose state exceeds this (rad, m, rad/s or m/s) has diverged.
+const SENSIBLE: f64 = 1e4;
+/// Largest relative change of a number at which the substeps are short enough.
+const STEP_TOLERANCE: f64 = 1e-3;
+/// Substeps are halved down to this, in s.
+const SHORTEST_STEP_S: f64 = PREDICTION_S / 64.0;
+
+/// The open-loop error of `dynamics` on `logs`, with the values that each log has of its own.
+///
+/// Windows start every half horizon and last one; their start states come from the log alone. The
+/// logged torque is held over each step.
+pub fn assess(dynamics: &Dynamics, logs: &[Log], horizons_s: &[f64]) -> Assessment {
+    let models: Vec<Cow<'_, Dynamics>> = logs.iter().map(|log| dynamics.in_log(log)).collect();
+    let mut step_s = PREDICTION_S;
+    let mut coarse = summarise(&run(&models, logs, horizons_s, step_s), dynamics.joints);
+    loop {
+        let horizons = run(&models, logs, horizons_s, step_s / 2.0);
+        let fine = summarise(&horizons, dynamics.joints);
+        let step_error = largest_change(&coarse, &fine);
+        if step_error <= STEP_TOLERANCE || step_s / 2.0 <= SHORTEST_STEP_S {
+            return Assessment {
+                horizons,
+                step_s: step_s / 2.0,
+                step_error,
+            };
+        }
+        coarse = fine;
+        step_s /= 2.0;
+    }
+}
+
+/// `models` gives the model in each log.
+fn run(
+    models: &[Cow<'_, Dynamics>],
+    logs: &[Log],
+    horizons_s: &[f64],
+    step_s: f64,
+) -> Vec<OpenLoop> {
+    let replays = replays(models, logs);
+    let all = |horizon_s: f64| -> Vec<Window> {
+        let of_log = |(index, log)| windows(index, log, horizon_s);
+        logs.iter().enumerate().flat_map(of_log).collect()
+    };
+    let one = |&horizon_s: &f64| OpenLoop {
+        horizon_s,
+        windows: errors(&replays, &all(horizon_s), step_s),
+    };
+    horizons_s.iter().map(one).collect()
+}
+
+/// The errors of a model in some windows of the logs, which are in the order of the logs, in substeps of at most
+/// `step_s`.
+pub fn errors_in(
+    dynamics: &Dynamics,
+    logs: &[Log],
+    windows: &[Window],
+    step_s: f64,
+) -> Vec<WindowError> {
+    let models: Vec<Cow<'_, Dynamics>> = logs.iter().map(|log| dynamics.in_log(log)).collect();
+    let replays = replays(&models, logs);
+    errors(&replays, windows, step_s)
+}
+
+/// `models` gives the model in each log.
+fn replays<'l>(models: &'l [Cow<'l, Dynamics>], logs: &'l [Log]) -> Vec<Replay<'l>> {
+    (models.iter().zip(logs))
+        .map(|(model, log)| Replay::new(Point::from(&**model), log))
+        .collect()
+}
+
+/// `replays` has one entry a log.
+fn errors(replays: &[Replay<'_>], windows: &[Window], step_s: f64) -> Vec<WindowError> {
+    let packs: Vec<&[Window]> = windows
+        .chunk_by(|a, b| a.log == b.log)
+        .flat_map(|of_one_log| of_one_log.chunks(LANES))
+        .collect();
+    let errors: Vec<Vec<WindowError>> = packs
+        .par_iter()
+        .map(|pack| replays[pack[0].log].errors(pack, step_s))
+        .collect();
+    errors.into_iter().flatten().collect()
+}
+
+/// Number of windows of `horizon_s` seconds in the logs.
+pub fn window_count(logs: &[Log], horizon_s: f64) -> usize {
+    logs.iter()
+        .enumerate()
+        .map(|(index, log)| windows(index, log, horizon_s).len())
+        .sum()
+}
+
+/// The windows of one log: one every half horizon, from the first row at which the state can be estimated.
+pub fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
+    let half_width = half_width_s(log.median_step());
+    let first = row_from(&log.time, log.time[0] + half_width);
+    let Some(&begin) = log.time.get(first) else {
+        return Vec::new();
+    };
+    let end_of_log = log.time[log.rows() - 1];
+    starts(log, begin, horizon_s)
+        .filter_map(|start| {
+            let first = row_from(&log.time, start);
+            let (from, to) = (log.time[first], log.time[first] + horizon_s);
+            let last = row_after(&log.time, to) - 1;
+            let touched = log.leave_out.iter().any(|span| span.touches(from, to));
+            let whole = to <= end_of_log + SAME_S && last > first && !touched;
+            (whole && initial_state(log, half_width, first).is_some()).then_some(Window {
+                log: index,
+                first,
+                last,
+            })
+        })
+        .collect()
+}
+
+/// The times at which windows start: every half horizon, as long as a horizon fits into the log. Those that no row
+/// follows within a horizon are passed over, so that a clock that jumps by years costs no time.
+fn starts(log: &Log, begin: f64, horizon_s: f64) -> impl Iterator<Item = f64> {
+    let half = horizon_s / 2.0;
+    let end_of_log = log.time[log.rows() - 1] + SAME_S;
+    let mut number = 0.0;
+    std::iter::from_fn(move || {
+        let mut start = begin + number * half;
+        let next = log.time.get(row_from(&log.time, start))?;
+        if *next > start + horizon_s {
+            number = ((next - horizon_s - begin) / half).ceil();
+            start = begin + number * half;
+        }
+        number += 1.0;
+        (start + horizon_s <= end_of_log).then_some(start)
+    })
+}
+
+/// A log and the model at its values in that log.
+struct Replay<'l> {
+    model: Point<'l>,
+    commands: Commands<'l>,
+    log: &'l Log,
+    /// The log with the rig's own angles, from which start states are estimated, and half of the time that tells them, s.
+    own: Cow<'l, Log>,
+    half_width_s: f64,
+}
+
+impl<'l> Replay<'l> {
+    fn new(model: Point<'l>, log: &'l Log) -> Self {
+        Self {
+            commands: Commands::of_log(&model, log),
+            own: with_own_angles(&model, log),
+            half_width_s: half_width_s(log.median_step()),
+            model,
+            log,
+        }
+    }
+
+    /// The errors of up to [`LANES`] windows of the log, in substeps of at most `step_s`.
+    fn errors(&self, pack: &[Window], step_s: f64) -> Vec<WindowError> {
+        let (log, n) = (self.log, self.model.dynamics.joints);
+        let commands = [&self.commands; LANES];
+        let lane = |lane: usize| pack[lane.min(pack.len() - 1)];
+        let mut simulator = Simulator::<LANES>::new(&self.model, RK4);
+        simulator.state = self.starts(pack);
+        let mut errors: Vec<WindowError> =
+            pack.iter().map(|w| WindowError::none(w, log, n)).collect();
+        let rows = pack.iter().map(Window::rows).max().unwrap_or(0);
+        for row in 0..rows - 1 {
+            let at: [usize; LANES] =
+                std::array::from_fn(|l| (lane(l).first + row).min(lane(l).last - 1));
+            simulator.follow(commands, at, step_s);
+            let counts = |l: usize| pack[l].first + row < pack[l].last;
+            for l in (0..pack.len()).filter(|l| counts(*l)) {
+                errors[l].hold(&mut simulator.state, l);
+            }
+            let shown = simulator.shown(commands, at.map(|row| row + 1));
+            for l in (0..pack.len()).filter(|l| counts(*l)) {
+                errors[l].add(shown, l, log, pack[l].first + row + 1);
+            }
+        }
+        errors
+    }
+
+    /// The states (`[2n][lane]`) at the windows' starts; empty lanes repeat the last.
+    fn starts(&self, pack: &[Window]) -> Vec<Row<f64, LANES>> {
+        let starts: Vec<Vec<f64>> = (pack.iter())
+            .map(|w| {
+                initial_state(&self.own, self.half_width_s, w.first).expect("windows() checks this")
+            })
+            .collect();
+        (0..self.model.dynamics.states())
+            .map(|k| Row(std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k])))
+            .collect()
+    }
+}
+
+impl WindowError {
+    fn none(window: &Window, log: &Log, joints: usize) -> Self {
+        Self {
+            log: window.log,
+            start_s: log.time[window.first],
+            rows: 0,
+            position: vec![0.0; joints],
+            velocity: vec![0.0; joints],
+            diverged: false,
+        }
+    }
+
+    /// Limit a state that has diverged, so that its error stays finite.
+    fn hold(&mut self, state: &mut [Row<f64, LANES>], lane: usize) {
+        for value in state.iter_mut() {
+            let value = &mut value[lane];
+            if !(value.abs() <= SENSIBLE) {
+                self.diverged = true;
+                *value = if value.is_nan() {
+                    SENSIBLE
+                } else {
+                    value.clamp(-SENSIBLE, SENSIBLE)
+                };
+            }
+        }
+    }
+
+    /// Add the errors of measured angles and velocities at a row of the log.
+    fn add(
+        &mut self,
+        [angles, velocities]: [&[Row<f64, LANES>]; 2],
+        lane: usize,
+        log: &Log,
+        row: usize,
+    ) {
+        self.rows += 1;
+        for j in 0..self.position.len() {
+            self.position[j] += (angles[j][lane] - log.q[j][row]).powi(2);
+            self.velocity[j] += (velocities[j][lane] - log.qd[j][row]).powi(2);
+        }
+    }
+}
+
+fn largest_change(coarse: &Summary, fine: &Summary) -> f64 {
+    let numbers = |summary: &Summary| -> Vec<f64> {
+        let Summary {
+            position_rmse,
+            position_median,
+            velocity_rmse,
+            ..
+        } = summary;
+        [position_rmse, position_median, velocity_rmse]
+            .into_iter()
+            .flatten()
+            .flatten()
+            .copied()
+            .collect()
+    };
+    let pairs = numbers(coarse).into_iter().zip(numbers(fine));
+    pairs
+        .map(|(a, b)| (a - b).abs() / b.abs().max(f64::MIN_POSITIVE))
+        .fold(0.0, f64::max)
+}

@@ -1,0 +1,27 @@
+//! Simulation: moving a model through time, in one place for fits, errors, simulated rigs and planners.
+
+pub mod batch;
+mod command;
+mod environment;
+mod integrator;
+pub mod metric;
+mod objective;
+mod point;
+mod scheme;
+mod sensors;
+mod simulator;
+mod stepper;
+mod substeps;
+mod window;
+
+pub use command::{Commands, Delivered, StepTorque};
+pub use environment::Environment;
+pub use integrator::{Integrator, IntegratorError};
+pub use objective::Objective;
+pub use point::Point;
+pub use scheme::{RK4, SCHEMES, SEMI_IMPLICIT_EULER, Scheme, Stage};
+pub use sensors::{Sensors, as_modelled, with_own_angles};
+pub use simulator::{Hold, Simulator};
+pub use stepper::Stepper;
+pub use substeps::{FINE_FIT_S, FIT_S, PREDICTION_S, RIG_S, substeps};
+pub use window::{Window, cut, initial_state};

@@ -1,0 +1,118 @@
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::ExperimentError;
+use residyn_core::limits::RUNS;
+use residyn_core::model::MlpSettings;
+use residyn_core::toml_text::from_toml;
+use residyn_io::files::read_text;
+use residyn_train::FitSettings;
+use residyn_train::recipe::RecipeError;
+
+/// The configuration of an experiment: methods, task and plant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// A task file, relative to this file, or the name of a built-in task.
+    pub task: PathBuf,
+    /// A plant file, relative to this file, or the name of a built-in plant.
+    pub plant: PathBuf,
+    /// Number of consecutive seeds; each method is repeated with each of them.
+    pub seeds: u64,
+    /// Transitions under random torques, before the first training.
+    pub random: usize,
+    /// Transitions T under control between two trainings.
+    pub gather: usize,
+    /// Receding horizons to compare, in steps.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub replan: Vec<usize>,
+    /// The methods that learn.
+    pub method: Vec<MethodConfig>,
+    /// The file that it was read from.
+    #[serde(skip)]
+    pub path: PathBuf,
+}
+
+/// A method that learns from the plant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MethodConfig {
+    pub name: String,
+    /// The equations of its prior: a model file, relative to this file, or the name of a built-in system.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<PathBuf>,
+    /// The trained model that is its prior: a checkpoint, relative to this file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checkpoint: Option<PathBuf>,
+    /// Number of trainings.
+    pub rounds: usize,
+    /// The network that is added to the prior or, without a prior, is the whole model.
+    pub network: MlpSettings,
+    #[serde(default)]
+    pub fit: FitSettings,
+}
+
+impl Config {
+    /// Read a configuration.
+    ///
+    /// # Errors
+    /// An unreadable file, an unknown key, a value out of range: with place and remedy.
+    pub fn read(path: &Path) -> Result<Self, ExperimentError> {
+        let mut config: Self = read_toml(path)?;
+        path.clone_into(&mut config.path);
+        config.check().map_err(|message| config.wrong(message))?;
+        Ok(config)
+    }
+
+    pub(super) fn wrong(&self, message: String) -> ExperimentError {
+        ExperimentError::file(&self.path, message)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let rounds = self.method.iter().map(|method| ("rounds", method.rounds));
+        let mut counts = [
+            ("seeds", usize::try_from(self.seeds).unwrap_or(usize::MAX)),
+            ("random", self.random),
+            ("gather", self.gather),
+            ("[[method]]", self.method.len()),
+        ]
+        .into_iter()
+        .chain(rounds);
+        if let Some((name, found)) = counts.find(|(_, count)| !(1..=RUNS).contains(count)) {
+            return Err(format!("`{name}` is from 1 to {RUNS}, found {found}"));
+        }
+        for (k, method) in self.method.iter().enumerate() {
+            let name = &method.name;
+            let sound = |c: char| c.is_ascii_alphanumeric() || c == '_';
+            if name.is_empty() || !name.chars().all(sound) {
+                return Err(format!(
+                    "the name {name:?} of a method becomes the name of a folder; use letters, digits and _"
+                ));
+            }
+            if [super::PRIOR, super::PERFECT].contains(&name.as_str())
+                || self.method[..k].iter().any(|other| other.name == *name)
+            {
+                return Err(format!(
+                    "the name `{name}` of a method is taken; choose another"
+                ));
+            }
+            if method.model.is_some() && method.checkpoint.is_some() {
+                return Err(format!(
+                    "method `{name}` has both `model` and `checkpoint`; its prior is one of them"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Reads a configuration in TOML.
+pub(super) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, ExperimentError> {
+    let text = read_text(path).map_err(|source| RecipeError::Open {
+        path: path.to_owned(),
+        source,
+    })?;
+    from_toml(&text).map_err(|error| ExperimentError::file(path, error.to_string()))
+}

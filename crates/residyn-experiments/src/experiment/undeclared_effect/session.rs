@@ -1,0 +1,71 @@
+use super::{Case, Experiment};
+use crate::experiment::ExperimentError;
+use residyn_control::control::Task;
+use residyn_core::model::{Library, Model};
+use residyn_core::plant::Plant;
+use residyn_io::files::beside_or_named;
+use residyn_io::read_model;
+use residyn_io::read_plant;
+use residyn_train::Backend;
+
+/// An experiment with everything it refers to read and checked.
+pub struct Session {
+    pub experiment: Experiment,
+    pub library: Library,
+    pub declared: Model,
+    pub task: Task,
+    /// One for each case.
+    pub plants: Vec<Plant>,
+    /// The backend that hybrids are trained on.
+    pub backend: Backend,
+    /// The first of the consecutive seeds.
+    pub first_seed: u64,
+}
+
+impl Session {
+    /// Reads everything that the experiment refers to. The seeds are `first_seed` and those that follow.
+    ///
+    /// # Errors
+    /// Files that are missing or not of the declared system.
+    pub fn new(
+        experiment: Experiment,
+        library: Library,
+        backend: Backend,
+        first_seed: u64,
+    ) -> Result<Self, ExperimentError> {
+        let model = beside_or_named(&experiment.path, &experiment.model);
+        let declared = read_model(&model, &library)?;
+        let task = Task::read(&beside_or_named(&experiment.path, &experiment.task))?;
+        if task.system != declared.name {
+            return Err(experiment.wrong(format!(
+                "the task is for {}, the model is of {}; give those that belong together",
+                task.system, declared.name
+            )));
+        }
+        let plant = |case: &Case| -> Result<Plant, ExperimentError> {
+            let wrong =
+                |message: String| experiment.wrong(format!("case `{}`: {message}", case.name));
+            let mut plant =
+                read_plant(&model, &library).map_err(|error| wrong(error.to_string()))?;
+            let parameters = plant.set_parameters(&case.parameters);
+            parameters.map_err(|error| wrong(error.to_string()))?;
+            let hidden = plant.hide(&library, &case.effects);
+            hidden.map_err(|error| wrong(error.to_string()))?;
+            Ok(plant)
+        };
+        let plants = experiment
+            .cases
+            .iter()
+            .map(plant)
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            experiment,
+            library,
+            declared,
+            task,
+            plants,
+            backend,
+            first_seed,
+        })
+    }
+}

@@ -1,0 +1,4 @@
+//! Learning from episodes ([`mbrl`]), and the published experiments ([`experiment`]).
+
+pub mod experiment;
+pub mod mbrl;

@@ -1,0 +1,33 @@
+use thiserror::Error;
+
+use residyn_control::control::{EpisodeError, LostPlan};
+use residyn_core::data::LogError;
+use residyn_core::plant::PlantError;
+use residyn_io::WriteLogError;
+use residyn_io::runs::RunFolderError;
+use residyn_train::{CheckpointError, HybridError, SegmentsError, TrainError};
+
+/// Why a run of the loop cannot begin or be resumed.
+#[derive(Debug, Error)]
+pub enum RunError {
+    #[error("{0}")]
+    Plant(#[from] PlantError),
+    #[error("{0}")]
+    Episode(#[from] EpisodeError),
+    #[error("{0}")]
+    Plan(#[from] LostPlan),
+    #[error("{0}")]
+    Train(#[from] TrainError),
+    #[error(transparent)]
+    Hybrid(#[from] HybridError),
+    #[error("{0}")]
+    Segments(#[from] SegmentsError),
+    #[error("{0}")]
+    Log(#[from] LogError),
+    #[error("{0}")]
+    WriteLog(#[from] WriteLogError),
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    #[error("{0}")]
+    Folder(#[from] RunFolderError),
+}

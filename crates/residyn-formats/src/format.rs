@@ -1,0 +1,160 @@
+//! What a format is: a writer, a client that reads the written files, and, for robot descriptions, a reader.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use super::verify::{Client, ClientError, Predictions, Samples};
+use super::{Change, ExportModel};
+use residyn_core::data::Joint;
+use residyn_core::limits::DELAY_STEPS;
+use residyn_core::model::chain::{Chain, model_text};
+use residyn_core::model::{CommandFilter, FileError, Library, Model, NetworkError, ReadyDrive};
+use residyn_io::files::{OutputError, write_whole};
+
+/// A format of other programs.
+#[derive(Debug)]
+pub struct Format {
+    pub name: &'static str,
+    /// What is written, in a few words.
+    pub about: &'static str,
+    /// The usual extension of its files, without a dot.
+    pub extension: &'static str,
+    /// Parts of a model that the format cannot represent, and what replaces them.
+    pub not_carried: fn(&ExportModel) -> Vec<String>,
+    /// The files for an output path, in memory.
+    pub files: fn(&ExportModel, &Path) -> Result<Vec<File>, ExportError>,
+    /// Predicts from the written files.
+    pub client: Client,
+    /// The largest allowed difference between the client's predictions and the program's own, relative to the largest
+    /// magnitude of each state.
+    pub tolerance: f64,
+    /// Reads robot descriptions, where these are what the format is for.
+    pub robots: Option<RobotReader>,
+}
+
+/// Reads a serial chain of bodies from a robot description, and writes values into it.
+#[derive(Debug)]
+pub struct RobotReader {
+    /// What can be read, in a few words.
+    pub about: &'static str,
+    /// The chain that ends at a body; without one at the end of the longest branch.
+    pub read: fn(&Path, Option<&str>) -> Result<Chain, FileError>,
+    /// The root element of its files.
+    pub root: &'static str,
+    /// The effects that its joints hold.
+    pub effects: &'static [&'static str],
+    /// The text of a file with changes of its numbers.
+    pub rewrite: fn(&Path, &[Change]) -> Result<String, FileError>,
+}
+
+impl RobotReader {
+    /// The model of the chain that ends at the body `tip`, without one at the end of the longest branch, and what of the
+    /// description is read differently or not at all. `drive` is what drives the joints, where that is not torques.
+    ///
+    /// # Errors
+    /// A description that cannot be read, or that is of no serial chain; an unknown drive.
+    pub fn model(
+        &self,
+        file: &Path,
+        tip: Option<&str>,
+        drive: Option<&str>,
+    ) -> Result<(Model, Vec<String>), FileError> {
+        let mut chain = (self.read)(file, tip)?;
+        if let Some(name) = drive {
+            let found = ReadyDrive::find(Library::drives(), name);
+            let found = found.map_err(|unknown| FileError::new(file, None, unknown.to_string()));
+            chain.drive = Some(found?);
+        }
+        let name = Path::new(&chain.name);
+        let model = Model::from_text(name, &model_text(&chain), Library::built_in().effects())?;
+        Ok((model, chain.notes))
+    }
+}
+
+/// A file to be written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct File {
+    pub path: PathBuf,
+    pub bytes: Vec<u8>,
+    /// What it holds, in a few words.
+    pub about: String,
+}
+
+/// Why a model cannot be exported.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    #[error("a model of `{system}` cannot be written as {format}: {reason}")]
+    Model {
+        format: &'static str,
+        system: String,
+        reason: String,
+    },
+    #[error(
+        "a model of `{system}` cannot be written as {format}: the delay of joint {joint} is {delay_s:?} s, and at most \
+         {DELAY_STEPS} steps of {step_s:?} s are remembered; give a longer step"
+    )]
+    Delay {
+        format: &'static str,
+        system: String,
+        joint: Joint,
+        delay_s: f64,
+        step_s: f64,
+    },
+    #[error("{0}")]
+    Write(#[from] OutputError),
+    #[error(transparent)]
+    Hybrid(#[from] NetworkError),
+}
+
+impl File {
+    pub(super) fn new(path: &Path, bytes: impl Into<Vec<u8>>, about: impl Into<String>) -> Self {
+        Self {
+            path: path.to_owned(),
+            bytes: bytes.into(),
+            about: about.into(),
+        }
+    }
+}
+
+impl Format {
+    /// Write the model. All files are made in memory first; then each appears whole or not at all.
+    ///
+    /// # Errors
+    /// A model that the format cannot carry, or a folder that cannot be written.
+    pub fn write(&self, model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
+        self.check_delays(model)?;
+        let files = (self.files)(model, path)?;
+        for file in &files {
+            write_whole(&file.path, &file.bytes)?;
+        }
+        Ok(files)
+    }
+
+    /// Refuse delays of more steps than what is written remembers commands for.
+    fn check_delays(&self, model: &ExportModel) -> Result<(), ExportError> {
+        let step_s = model.step_s;
+        for joint in Joint::all(model.joints()) {
+            let delay_s = model.filter(joint, CommandFilter::Delay).unwrap_or(0.0);
+            if !(delay_s / step_s <= DELAY_STEPS as f64) {
+                return Err(ExportError::Delay {
+                    system: model.name().to_owned(),
+                    format: self.name,
+                    joint,
+                    delay_s,
+                    step_s,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// What the format's client predicts from a written file.
+    ///
+    /// # Errors
+    /// No client available, or one that fails on the file.
+    pub fn predict(&self, path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
+        self.client.predict(path, samples)
+    }
+}

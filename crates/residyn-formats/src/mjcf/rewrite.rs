@@ -1,0 +1,110 @@
+//! Writes values into a file, and leaves all else in it as it is.
+
+use std::path::Path;
+
+use nalgebra::Matrix3;
+use roxmltree::Node;
+
+use super::orientation::WAYS;
+use super::read::{Reader, linear};
+use crate::robot::edit::{Edit, same};
+use crate::robot::mechanism::numbers;
+use crate::robot::write_back::{Change, body, is_some};
+use crate::xml::{self, Source, named};
+use residyn_core::model::FileError;
+use residyn_core::model::chain::{Drivetrain, Inertia};
+
+/// The text of the file at `path` with these changes.
+///
+/// # Errors
+/// A file that is not read, joints without names, or values that no body has.
+pub fn rewrite(path: &Path, changes: &[Change]) -> Result<String, FileError> {
+    let text = xml::text(path)?;
+    let source = Source::new(path, &text)?;
+    let reader = Reader::new(&source)?;
+    let mut edit = Edit::of(&text);
+    for change in changes {
+        let joint = reader.joint(&change.joint)?;
+        write_joint(&reader, &mut edit, joint, &change.drivetrain)?;
+        let body = joint.parent_element();
+        if let Some(body) = body.filter(|_| is_some(&change.added)) {
+            write_inertia(&reader, &mut edit, body, &change.added)?;
+        }
+    }
+    Ok(edit.finished())
+}
+
+fn write_joint<'s>(
+    reader: &Reader<'s, '_>,
+    edit: &mut Edit<'_>,
+    joint: Node<'s, '_>,
+    wanted: &Drivetrain,
+) -> Result<(), FileError> {
+    let given = reader.element(joint)?;
+    let values = [
+        ("damping", linear(&given, "damping")?, wanted.damping),
+        (
+            "frictionloss",
+            given.not_negative("frictionloss")?,
+            wanted.friction,
+        ),
+        ("armature", given.not_negative("armature")?, wanted.armature),
+    ];
+    for (key, _, value) in values
+        .iter()
+        .filter(|(_, given, value)| !same(*given, *value))
+    {
+        edit.set(joint, key, &[*value]);
+    }
+    Ok(())
+}
+
+fn write_inertia<'s>(
+    reader: &Reader<'s, '_>,
+    edit: &mut Edit<'_>,
+    of: Node<'s, '_>,
+    added: &Inertia,
+) -> Result<(), FileError> {
+    if reader.inertia_from_geom == "true" {
+        let message = "`inertiafromgeom` takes every inertia from geoms; set it to \"auto\", which lets <inertial> prevail";
+        return Err(reader.source.error(of, message));
+    }
+    let class = reader.class_of(of);
+    let name = of.attribute("name").unwrap_or_default();
+    let whole = reader.inertia(of, class, name)?.with(added);
+    let (centre, tensor) = body(reader.source, of, &whole)?;
+    let Some(inertial) = named(of, "inertial").next() else {
+        let [pos, mass, full] = [
+            numbers(centre.iter().copied()),
+            numbers([whole.mass]),
+            numbers(entries(&tensor)),
+        ];
+        edit.insert(
+            of,
+            &format!("<inertial pos=\"{pos}\" mass=\"{mass}\" fullinertia=\"{full}\"/>"),
+        );
+        return Ok(());
+    };
+    edit.set(inertial, "pos", centre.as_slice());
+    edit.set(inertial, "mass", &[whole.mass]);
+    let turn = reader
+        .angles
+        .orientation(&reader.source.element(inertial))?;
+    let own = turn.transpose() * tensor * turn;
+    let beside = own - Matrix3::from_diagonal(&own.diagonal());
+    if inertial.has_attribute("diaginertia") && beside.norm() <= 1e-12 * own.norm() {
+        edit.set(inertial, "diaginertia", own.diagonal().as_slice());
+    } else {
+        // The axes of a full tensor are those of the body.
+        for key in WAYS.into_iter().chain(["diaginertia"]) {
+            edit.remove(inertial, key);
+        }
+        edit.set(inertial, "fullinertia", &entries(&tensor));
+    }
+    Ok(())
+}
+
+/// In the order of `fullinertia`.
+fn entries(tensor: &Matrix3<f64>) -> [f64; 6] {
+    [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|at| tensor[at])
+}

@@ -1,0 +1,174 @@
+//! Writes the mechanism of a model.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use super::read::read_mjcf;
+use super::rewrite::rewrite;
+use crate::robot::mechanism::{
+    Drive, Link, Mechanism, file, friction_widths, head, numbers, option,
+};
+use crate::verify::{Client, PythonClient};
+use crate::xml::escaped;
+use crate::{ExportError, ExportModel, File, Format, RobotReader};
+use residyn_core::model::chain::Joint;
+
+pub(crate) const FORMAT: Format = Format {
+    name: "mjcf",
+    about: "a serial mechanism with its friction, springs and drives, for MuJoCo",
+    extension: "xml",
+    not_carried,
+    files,
+    client: Client::Python(PythonClient {
+        name: "mjcf.py",
+        script: include_str!("../../../../docs/clients/mjcf.py"),
+        packages: "mujoco numpy",
+    }),
+    tolerance: 1e-9,
+    robots: Some(RobotReader {
+        about: "up to twelve hinge or slide joints, one carrying the next",
+        read: read_mjcf,
+        root: "mujoco",
+        effects: &["viscous_friction", "coulomb_friction", "rotor_inertia"],
+        rewrite,
+    }),
+};
+
+fn not_carried(model: &ExportModel) -> Vec<String> {
+    let Ok(mechanism) = Mechanism::of(model) else {
+        return Vec::new();
+    };
+    let mut lost = mechanism.not_carried;
+    if mechanism.drives.iter().any(|drive| drive.lag.is_some()) {
+        lost.push(
+            "the lag within a step: MuJoCo holds the lagged torque over each step; only the derivative is compared"
+                .into(),
+        );
+    }
+    lost
+}
+
+fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
+    file(model, path, "MJCF", text)
+}
+
+fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
+    let mut text = head(model);
+    let _ = write!(
+        text,
+        "<mujoco model=\"{}\">\n  <compiler angle=\"radian\"/>\n  {}\n  <custom>\n    \
+         <!-- Velocities over which dry friction reverses in the exported model. -->\n    \
+         <numeric name=\"dry_friction_width\" data=\"{}\"/>\n  </custom>\n  <worldbody>\n",
+        escaped(model.name()),
+        option(model, mechanism),
+        friction_widths(model)
+    );
+    let links = mechanism.links();
+    for (k, (joint, link)) in mechanism.joints.iter().zip(&links).enumerate() {
+        text += &body(joint, link, links.get(k + 1), &"  ".repeat(k + 2));
+    }
+    for k in (0..links.len()).rev() {
+        let _ = writeln!(text, "{}</body>", "  ".repeat(k + 2));
+    }
+    text += "  </worldbody>\n  <actuator>\n";
+    for (joint, drive) in mechanism.joints.iter().zip(&mechanism.drives) {
+        text += &actuator(joint, drive);
+    }
+    text + "  </actuator>\n</mujoco>\n"
+}
+
+/// A body, its element left open for the next.
+fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String {
+    let rotation = link.pose.rotation;
+    let axes = rotation
+        .column(0)
+        .iter()
+        .chain(rotation.column(1).iter())
+        .copied()
+        .collect::<Vec<_>>();
+    let t = link.tensor;
+    let tensor = [
+        t[(0, 0)],
+        t[(1, 1)],
+        t[(2, 2)],
+        t[(0, 1)],
+        t[(0, 2)],
+        t[(1, 2)],
+    ];
+    let end = next.map_or(link.centre, |next| next.pose.origin);
+    let shape = match end.norm() {
+        0.0 => "type=\"sphere\" size=\"0.04\"".to_owned(),
+        length => {
+            let ends = numbers([0.0; 3].into_iter().chain(end.iter().copied()));
+            format!(
+                "type=\"capsule\" size=\"{}\" fromto=\"{ends}\"",
+                numbers([0.05 * length])
+            )
+        }
+    };
+    format!(
+        "{indent}<body name=\"{}\" pos=\"{}\" xyaxes=\"{}\">\n\
+         {indent}  <joint name=\"{}\" type=\"{}\" axis=\"{}\"{}/>\n\
+         {indent}  <inertial pos=\"{}\" mass=\"{}\" fullinertia=\"{}\"/>\n\
+         {indent}  <geom {shape} mass=\"0\" contype=\"0\" conaffinity=\"0\"/>\n",
+        joint.body,
+        numbers(link.pose.origin.iter().copied()),
+        numbers(axes),
+        joint.name,
+        if joint.slides { "slide" } else { "hinge" },
+        numbers(link.axis.iter().copied()),
+        of_joint(joint),
+        numbers(link.centre.iter().copied()),
+        numbers([link.mass]),
+        numbers(tensor),
+    )
+}
+
+/// Attributes of the joint's drivetrain.
+fn of_joint(joint: &Joint) -> String {
+    let spring = joint
+        .drivetrain
+        .spring
+        .map_or([0.0, 0.0], |spring| [spring.stiffness, spring.rest]);
+    attributes(&[
+        ("damping", joint.drivetrain.damping, 0.0),
+        ("frictionloss", joint.drivetrain.friction, 0.0),
+        ("armature", joint.drivetrain.armature, 0.0),
+        ("stiffness", spring[0], 0.0),
+        ("springref", spring[1], 0.0),
+    ])
+}
+
+/// Attributes whose values differ from the format's defaults.
+fn attributes(values: &[(&str, f64, f64)]) -> String {
+    #[allow(clippy::float_cmp)] // as set
+    let given = values.iter().filter(|(_, value, default)| value != default);
+    given
+        .map(|(key, value, _)| format!(" {key}=\"{value}\""))
+        .collect()
+}
+
+fn actuator(joint: &Joint, drive: &Drive) -> String {
+    let mut text = format!("    <general name=\"{}\" joint=\"{0}\"", joint.name);
+    text += &attributes(&[("gear", drive.gear, 1.0), ("gainprm", drive.gain, 1.0)]);
+    let [constant, by_position, by_velocity] = drive.bias;
+    if drive.bias != [0.0; 3] {
+        let _ = write!(
+            text,
+            " biastype=\"affine\" biasprm=\"{}\"",
+            // The bias is by the length and the velocity of the actuator: those of the joint times the gear.
+            numbers([constant, by_position / drive.gear, by_velocity / drive.gear])
+        );
+    }
+    if let Some(limit) = drive.limit {
+        let _ = write!(
+            text,
+            " forcelimited=\"true\" forcerange=\"{}\"",
+            numbers([-limit, limit])
+        );
+    }
+    if let Some(time) = drive.lag {
+        let _ = write!(text, " dyntype=\"filterexact\" dynprm=\"{time}\"");
+    }
+    text + "/>\n"
+}

@@ -1,0 +1,104 @@
+//! How short the steps of a model have to be around rest, where dry friction is steepest.
+
+use std::f64::consts::PI;
+
+use nalgebra::DMatrix;
+use nalgebra::linalg::Schur;
+use rand::{Rng, RngExt};
+
+use super::ExportModel;
+use residyn_core::model::{Dynamics, NetworkError};
+
+/// Rate of decay times the length of a step up to which a step decays without overshooting, whatever the scheme.
+const WITHOUT_OVERSHOOT: f64 = 1.0;
+/// Velocities between which the slope of friction at rest is taken \[rad/s or m/s\]: it reverses over far more.
+const AROUND_REST: f64 = 1e-7;
+/// Positions that are looked at.
+const POSITIONS: usize = 64;
+/// Of finding eigenvalues: their precision, and the most iterations.
+const PRECISION: f64 = 1e-9;
+const ITERATIONS: usize = 1000;
+
+impl ExportModel {
+    /// The equal parts that a step has to be integrated in so that the model comes to rest as its friction stops it: in longer
+    /// ones velocities overshoot, and a model that should rest creeps or chatters. By the fastest rate at which velocities decay at
+    /// rest, in positions drawn from `rng`.
+    ///
+    /// # Errors
+    /// A network that does not fit the number of joints.
+    pub fn substeps_around_rest(&self, rng: &mut impl Rng) -> Result<usize, NetworkError> {
+        let whole = self.reference()?.whole;
+        let mut position = || -> Vec<f64> {
+            let each = 0..whole.joints;
+            each.map(|_| rng.random_range(-PI..PI)).collect()
+        };
+        let rates = (0..POSITIONS).map(|_| rate(&whole, &position()));
+        let fastest = rates.fold(0.0, f64::max);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates
+        let parts = (fastest * self.step_s / WITHOUT_OVERSHOOT).ceil() as usize;
+        Ok(parts.max(1))
+    }
+}
+
+/// The fastest rate at which velocities decay \[1/s\] at rest in a position, without torque.
+fn rate(model: &Dynamics, position: &[f64]) -> f64 {
+    let n = model.joints;
+    let rates = |joint: usize, velocity: f64| {
+        let still = vec![0.0; 2 * n + 1];
+        let mut inputs = [position, &still, &model.values()].concat();
+        inputs[n + joint] = velocity;
+        model.program.eval(&inputs)
+    };
+    let mut slopes = DMatrix::zeros(n, n);
+    for joint in 0..n {
+        let [faster, slower] = [AROUND_REST, -AROUND_REST].map(|velocity| rates(joint, velocity));
+        // The last of the rates are those of the velocities.
+        let pairs = faster.iter().zip(&slower).rev().zip((0..n).rev());
+        for ((faster, slower), i) in pairs {
+            slopes[(i, joint)] = (faster - slower) / (2.0 * AROUND_REST);
+        }
+    }
+    let schur = Schur::try_new(slopes, PRECISION, ITERATIONS);
+    schur.map_or(0.0, |schur| {
+        let rates = schur.complex_eigenvalues();
+        rates.iter().map(|rate| -rate.re).fold(0.0, f64::max)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use super::*;
+    use residyn_core::model::{Library, Model};
+    use residyn_core::sim::Integrator;
+
+    /// A pendulum of 3 (rad/s^2)/(N m).
+    fn pendulum(effect: &str) -> ExportModel {
+        let text = Library::system_text("pendulum").unwrap();
+        let library = Library::built_in();
+        let model = Model::from_text(
+            "p.toml".as_ref(),
+            &(text.to_owned() + effect),
+            library.effects(),
+        )
+        .unwrap();
+        ExportModel::of_system(&model, Integrator::RK4, 0.01, Value::Null)
+    }
+
+    #[test]
+    fn friction_asks_for_the_steps_of_its_slope() {
+        let friction = "\n[[effect]]\nname = \"coulomb_friction\"\njoint = 1\nF_c = 0.19\n";
+        let substeps = |model: ExportModel| {
+            model
+                .substeps_around_rest(&mut residyn_core::rng(1))
+                .unwrap()
+        };
+        assert_eq!(substeps(pendulum("")), 1);
+        // It reverses over 0.01 rad/s: 3 * 0.19 / 0.01 = 57/s, of which a step of 10 ms is 0.57.
+        assert_eq!(substeps(pendulum(friction)), 1);
+        let mut narrow = pendulum(friction);
+        narrow.step_s = 0.1;
+        assert_eq!(substeps(narrow), 6);
+    }
+}

@@ -1,0 +1,248 @@
+//! A model as simulators of rigid bodies can represent it: a mechanism with the same equations, and those effects that
+//! joints and drives have there.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::servo::{Servo, servos};
+use crate::xml::escaped;
+use crate::{ExportError, ExportModel, ExportedEffect, File};
+use residyn_core::model::chain::{Joint, Pose, Spring, recover, rounded};
+use residyn_core::sim::{RK4, SEMI_IMPLICIT_EULER, Scheme};
+
+/// A mechanism with its drives.
+pub(crate) struct Mechanism {
+    pub joints: Vec<Joint>,
+    pub drives: Vec<Drive>,
+    /// m/s^2, against z
+    pub gravity: f64,
+    /// The model's scheme as MuJoCo names it.
+    pub integrator: &'static str,
+    /// What of the model it does not carry.
+    pub not_carried: Vec<String>,
+}
+
+/// A drive: torque = gear * clamp(gain * command + bias, -limit, limit).
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Drive {
+    pub gain: f64,
+    pub gear: f64,
+    /// A constant (N m or N), and slopes by position and velocity of the joint.
+    pub bias: [f64; 3],
+    /// N m or N, before the gear.
+    pub limit: Option<f64>,
+    /// Time constant in s.
+    pub lag: Option<f64>,
+}
+
+/// A body in the frame of its parent at q = 0.
+pub(crate) struct Link {
+    pub pose: Pose,
+    pub axis: Vector3<f64>,
+    pub mass: f64,
+    pub centre: Vector3<f64>,
+    /// About the centre of mass, in the body's axes.
+    pub tensor: Matrix3<f64>,
+}
+
+const DRY_FRICTION: &str = "dry friction that reverses smoothly: MuJoCo's frictionloss lets joints stick, and the comparison has the smooth form in its place";
+
+/// The schemes that MuJoCo has, and its names for them.
+const INTEGRATORS: [(&Scheme, &str); 2] = [(SEMI_IMPLICIT_EULER, "Euler"), (RK4, "RK4")];
+
+fn integrator(scheme: &Scheme) -> Result<&'static str, String> {
+    let mut known = INTEGRATORS.into_iter();
+    let found = known.find(|(known, _)| *known == scheme);
+    found.map(|(_, name)| name).ok_or_else(|| {
+        let known = INTEGRATORS.map(|(scheme, _)| scheme.name).join(" or ");
+        format!("MuJoCo has no {}; export it with {known}", scheme.title)
+    })
+}
+
+impl Mechanism {
+    /// The mechanism of a model.
+    ///
+    /// # Errors
+    /// Equations of no known mechanism, equations with time, a network in their place, or a scheme that MuJoCo lacks.
+    pub fn of(model: &ExportModel) -> Result<Self, String> {
+        if model.prior.is_some() {
+            return Err("a network replaces its equations".into());
+        }
+        if model.depends_on_time() {
+            return Err("its equations depend on time".into());
+        }
+        let mut found = match model.system.mechanism(&model.equations.values()) {
+            Some(chain) => chain,
+            None => recover(&model.declared(), &model.system.prismatic)?,
+        };
+        if found.joints.iter().any(|joint| joint.follows.is_some()) {
+            return Err("one of its links follows the joint of another".into());
+        }
+        for (joint, name) in found.joints.iter_mut().zip(&model.system.joint_names) {
+            joint.name = escaped(name);
+        }
+        let still = Drive {
+            gain: 1.0,
+            gear: 1.0,
+            bias: [0.0; 3],
+            limit: None,
+            lag: None,
+        };
+        let mut mechanism = Self {
+            drives: drives(model, &still)?,
+            joints: found.joints,
+            gravity: found.gravity,
+            integrator: integrator(model.integrator.scheme())?,
+            not_carried: Vec::new(),
+        };
+        // Behind a limit no constant torque can be added.
+        let is_constant = |effect: &&ExportedEffect| effect.name == "constant_torque";
+        let (constant, others): (Vec<_>, Vec<_>) = model.effects.iter().partition(is_constant);
+        for effect in others.into_iter().chain(constant) {
+            mechanism.carry(effect, model);
+        }
+        if model.residual.is_some() {
+            mechanism
+                .not_carried
+                .push("the network for what the equations lack".into());
+        }
+        mechanism.not_carried.extend(model.sensors_not_carried());
+        let mut joints = mechanism.joints.iter();
+        if joints.any(|joint| joint.drivetrain.friction > 0.0) {
+            mechanism.not_carried.push(DRY_FRICTION.into());
+        }
+        Ok(mechanism)
+    }
+
+    fn carry(&mut self, effect: &ExportedEffect, model: &ExportModel) {
+        let parameters = &model.equations.parameters;
+        let value = |name: &String| {
+            parameters
+                .iter()
+                .find(|p| p.name == *name)
+                .map_or(0.0, |p| p.value)
+        };
+        let values: Vec<f64> = effect.parameters.iter().map(value).collect();
+        let (joints, drives) = (&mut self.joints, &mut self.drives);
+        let (joint, drive) = (&mut joints[effect.joint], &mut drives[effect.joint]);
+        match (effect.name.as_str(), &values[..]) {
+            ("viscous_friction", [b]) => joint.drivetrain.damping += b,
+            ("coulomb_friction", [level]) => joint.drivetrain.friction += level,
+            ("rotor_inertia", [inertia]) => joint.drivetrain.armature += inertia,
+            ("joint_spring", [stiffness, rest]) => {
+                joint.drivetrain.spring = Some(Spring {
+                    stiffness: *stiffness,
+                    rest: *rest,
+                });
+            }
+            ("gravity_tilt", [angle]) => joint.reference -= angle,
+            // A gain behind the limit is a gear.
+            ("actuator_gain", [excess]) if drive.limit.is_some() => drive.gear *= 1.0 + excess,
+            ("actuator_gain", [excess]) => drive.gain *= 1.0 + excess,
+            ("actuator_saturation", [limit]) => {
+                let behind = limit / drive.gear;
+                drive.limit = Some(drive.limit.map_or(behind, |own| own.min(behind)));
+            }
+            ("actuator_lag", [time]) => drive.lag = Some(*time),
+            ("constant_torque", [torque]) if drive.limit.is_none() => drive.bias[0] += torque,
+            _ => self.not_carried.push(format!(
+                "{} on joint {}: {}",
+                effect.name, effect.joint, effect.expression
+            )),
+        }
+    }
+
+    /// The bodies, from the base outwards.
+    pub fn links(&self) -> Vec<Link> {
+        let mut parent = Pose::identity();
+        let link = |joint: &Joint| {
+            // The body's frame is put at the joint.
+            let own = Pose {
+                origin: Vector3::zeros(),
+                ..joint.in_body()
+            };
+            let pose = parent.then(&joint.at_zero()).then(&own.inverse());
+            parent = own;
+            let inertia = joint.inertia.seen_from(&own);
+            let (centre, tensor) = inertia.about_centre();
+            Link {
+                pose,
+                axis: joint.axis,
+                mass: inertia.mass,
+                centre,
+                tensor,
+            }
+        };
+        self.joints.iter().map(link).collect()
+    }
+}
+
+/// The drives of a model, which are like `still` where torques are commanded.
+fn drives(model: &ExportModel, still: &Drive) -> Result<Vec<Drive>, String> {
+    let Some(program) = model.system.drive_program() else {
+        return Ok(vec![still.clone(); model.joints()]);
+    };
+    let values = model.equations.values();
+    let servos = servos(
+        &program,
+        model.joints(),
+        &values[..model.system.parameters.len()],
+    )?;
+    let drive = |servo: Servo| Drive {
+        gain: servo.gain,
+        bias: servo.bias,
+        limit: servo.limit,
+        ..still.clone()
+    };
+    Ok(servos.into_iter().map(drive).collect())
+}
+
+/// For each joint the velocity (rad/s or m/s) over which dry friction reverses; 0 where it jumps.
+pub(crate) fn friction_widths(model: &ExportModel) -> String {
+    numbers(model.system.sign_widths())
+}
+
+/// Numbers to 15 digits, separated by blanks; rounding errors about zero become zero.
+pub(crate) fn numbers(numbers: impl IntoIterator<Item = f64>) -> String {
+    let mut text = String::new();
+    for number in numbers {
+        let number = if number.abs() < 1e-15 {
+            0.0
+        } else {
+            rounded(number)
+        };
+        let _ = write!(text, "{}{number}", if text.is_empty() { "" } else { " " });
+    }
+    text
+}
+
+/// Gravity, step and integrator of the model, for MuJoCo.
+pub(crate) fn option(model: &ExportModel, mechanism: &Mechanism) -> String {
+    format!(
+        "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
+        numbers([0.0, 0.0, -mechanism.gravity]),
+        model.step_s / model.integrator.substeps() as f64,
+        mechanism.integrator
+    )
+}
+
+/// XML declaration and provenance.
+pub(crate) fn head(model: &ExportModel) -> String {
+    // Two hyphens end a comment.
+    let origin = model.provenance().to_string().replace("--", "- -");
+    format!("<?xml version=\"1.0\"?>\n<!-- {origin} -->\n")
+}
+
+/// The one file of a format, whose contents `text` writes.
+pub(crate) fn file(
+    model: &ExportModel,
+    path: &Path,
+    format: &'static str,
+    text: fn(&ExportModel, &Mechanism) -> String,
+) -> Result<Vec<File>, ExportError> {
+    let mechanism = Mechanism::of(model).map_err(|reason| model.refused(format, reason))?;
+    let about = "a mechanism with the same equations";
+    Ok(vec![File::new(path, text(model, &mechanism), about)])
+}

@@ -1,0 +1,17 @@
+//! Logs, models, plants and runs as files. Everything that opens one is here or in the binary; what they mean is in
+//! `residyn-core`.
+
+pub mod files;
+pub mod guarded;
+mod log_file;
+mod model_file;
+mod plant_file;
+pub mod runs;
+mod table;
+
+pub use guarded::guarded;
+pub use log_file::{
+    WriteLogError, read_log, read_logs, read_rig_log, read_standard_log, write_log,
+};
+pub use model_file::{effect_files, read_effect, read_model, with_effects_in};
+pub use plant_file::{plant_from_text, read_plant};

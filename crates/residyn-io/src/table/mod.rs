@@ -1,0 +1,129 @@
+//! Files of logs, as named columns of numbers: one reader a format behind one function.
+
+mod arrays;
+mod csv;
+#[cfg(feature = "parquet")]
+mod ending;
+#[cfg(feature = "parquet")]
+mod lerobot;
+mod mat;
+mod npy;
+mod npz;
+#[cfg(feature = "parquet")]
+mod parquet;
+#[cfg_attr(not(feature = "recordings"), path = "no_recording.rs")]
+mod recording;
+mod room;
+mod source;
+#[cfg(feature = "parquet")]
+mod thrift;
+
+use std::path::Path;
+
+pub(super) use self::csv::Csv;
+pub(super) use self::source::Source;
+use residyn_core::data::{Columns, LogError, Table};
+
+use crate::guarded::guarded;
+use residyn_core::limits::LOG_COLUMNS;
+
+/// How files of each format but text begin.
+const ZIP: &[u8] = b"PK\x03\x04";
+const PARQUET: &[u8] = b"PAR1";
+const SQLITE: &[u8] = b"SQLite format 3\0";
+const MCAP: &[u8] = b"\x89MCAP0\r\n";
+
+/// Files that are known and not read: how they begin, and the line that converts them.
+const FOREIGN: [(&[u8], &str); 7] = [
+    (
+        b"#ROSBAG",
+        "a ROS 1 bag is not read; convert it: `pip install rosbags && rosbags-convert --src run.bag --dst run`, and read the \
+         folder `run`",
+    ),
+    (
+        b"\x28\xb5\x2f\xfd",
+        "is packed with zstd; unpack it: `zstd -d run.db3.zstd`",
+    ),
+    (
+        SQLITE,
+        "a packed recording is not read; unpack it: `gunzip run.db3.gz`",
+    ),
+    (
+        ZIP,
+        "an .npz that is packed once more is not read; unpack it: `gunzip run.npz.gz`",
+    ),
+    (
+        b"\x89HDF",
+        "HDF5 is not read; convert it: `python -c \"import h5py, numpy; f = h5py.File('run.h5'); numpy.savez('run.npz', **{k: f[k][:] for k in f})\"`",
+    ),
+    (
+        b"MATLAB 7.3",
+        "MATLAB's version 7.3 is HDF5, which is not read; save it with '-v7', or convert it: \
+         `python -c \"import h5py, numpy; f = h5py.File('run.mat'); numpy.savez('run.npz', **{k: f[k][:].T for k in f if k[0] != '#'})\"`",
+    ),
+    (
+        PARQUET,
+        "Parquet is not read by a program without the feature `parquet`, nor packed; build it with that, or convert it: \
+         `python -c \"import pandas; pandas.read_parquet('run.parquet').to_csv('run.csv', index=False)\"`",
+    ),
+];
+
+/// The table that a file or a folder holds, whatever its format: by how it begins, not by its name. Of files that hold
+/// several tables, the one that has the columns.
+///
+/// # Errors
+/// A file that cannot be read, that is of none of the formats, or that has too many columns.
+pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
+    let damaged = || LogError::Form {
+        path: path.to_owned(),
+        fault: "is damaged: its offsets and lengths contradict each other; write it again"
+            .to_owned(),
+    };
+    let table = guarded(|| read(path, columns)).ok_or_else(damaged)??;
+    let found = table.names().len();
+    if found > LOG_COLUMNS {
+        return Err(LogError::Form {
+            path: path.to_owned(),
+            fault: format!("has {found} columns; at most {LOG_COLUMNS} are read"),
+        });
+    }
+    Ok(table)
+}
+
+fn read(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
+    #[cfg(feature = "parquet")]
+    if let Some(episode) = lerobot::Episode::of(path) {
+        return Ok(Box::new(episode.read()?));
+    }
+    if path.is_dir() {
+        return Ok(Box::new(recording::of_folder(path, columns)?));
+    }
+    let source = Source::of(path)?;
+    let begin = source.begin()?;
+    // Recordings may be larger than the memory: they are not read at once.
+    if !source.is_packed() {
+        if begin.starts_with(SQLITE) {
+            return Ok(Box::new(recording::of_bag(path, columns)?));
+        }
+        if begin.starts_with(MCAP) {
+            return Ok(Box::new(recording::of_mcap(path, columns)?));
+        }
+        if begin.starts_with(ZIP) {
+            return Ok(Box::new(npz::read(path)?));
+        }
+        #[cfg(feature = "parquet")]
+        if begin.starts_with(PARQUET) {
+            return Ok(Box::new(parquet::read(path)?));
+        }
+    }
+    if let Some((_, remedy)) = FOREIGN.iter().find(|(known, _)| begin.starts_with(known)) {
+        return Err(LogError::Form {
+            path: path.to_owned(),
+            fault: (*remedy).to_owned(),
+        });
+    }
+    if begin.starts_with(mat::MAGIC) {
+        return Ok(Box::new(mat::read(path, &source)?));
+    }
+    Ok(Box::new(Csv::of(path, source)?))
+}

@@ -1,0 +1,33 @@
+//! What closing the loop found, for people and for programs.
+
+mod accuracy;
+mod bodies;
+mod by_log;
+mod calibration;
+mod effect_curve;
+mod film;
+mod folder;
+mod headline;
+mod json;
+mod lengths;
+mod model_file;
+mod motion;
+mod page;
+mod picture;
+pub mod plot;
+mod remainder;
+mod schema;
+mod shown;
+mod summary;
+mod tensorboard;
+mod text;
+mod wording;
+
+pub use film::{Film, film};
+pub use folder::{ReadError, WriteError, write};
+pub use model_file::model_file;
+pub use page::{ResultsPage, Share, page};
+pub use schema::{Report, schema};
+pub use summary::{Words, answer, curves, summary};
+pub use tensorboard::EventFile;
+pub use text::text;

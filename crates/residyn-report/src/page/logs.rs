@@ -1,0 +1,112 @@
+//! Which number to trust: each parameter by log, and what is fitted to one log judged by the others.
+
+use maud::{Markup, html};
+
+use crate::by_log::OfLogEntry;
+use crate::schema::{ParameterEntry, Report};
+use crate::wording::{amount, small};
+use residyn_core::closeloop::Space;
+use residyn_core::digits::{amount_of, digits_of};
+
+pub(super) fn by_log(report: &Report) -> Markup {
+    html! {
+        @if !report.by_log.is_empty() {
+            h3 { "Do the logs agree?" }
+            p { "The model with effects, fitted to each training log alone. A value is marked where its distance from that of all logs "
+                "together is more than its own 95 % interval explains, and not told where that is far wider than the value." }
+            (values(report))
+            (crossed(report))
+            (ranges(report))
+        }
+    }
+}
+
+/// By how much a value of one log is off, in half widths of its interval: 0 within it, 1 to 3 beyond.
+fn mark(of_log: &ParameterEntry, of_all: f64) -> &'static str {
+    let half = of_log
+        .ci95
+        .map_or(f64::INFINITY, |[low, high]| 0.5 * (high - low));
+    match (of_log.value - of_all).abs() / half {
+        far if far > 3.0 => "off-3",
+        far if far > 2.0 => "off-2",
+        far if far > 1.0 => "off-1",
+        _ => "off-0",
+    }
+}
+
+fn values(report: &Report) -> Markup {
+    html! {
+        div.table tabindex="0" { table {
+            thead { tr { th { "parameter" } th { "all logs" } @for log in &report.by_log { th { (log.log) } } } }
+            tbody {
+                @for of_all in &report.ranges {
+                    tr {
+                        th scope="row" { code { (of_all.name) } @if of_all.unit != "1" { ", " (of_all.unit) } }
+                        td { (digits_of(of_all.value, Some(of_all.range)).0) }
+                        @for log in &report.by_log { (value(log, &of_all.name, of_all.value)) }
+                    }
+                }
+            }
+        } }
+        @for log in &report.by_log {
+            @if let Some(failure) = &log.failure { p { (log.log) ": " (failure) "." } }
+        }
+    }
+}
+
+fn value(log: &OfLogEntry, name: &str, of_all: f64) -> Markup {
+    let own = log
+        .parameters
+        .iter()
+        .find(|parameter| parameter.name == name);
+    html! {
+        @match own {
+            Some(own) if is_told(own) => td class=(mark(own, of_all)) title=(amount(own)) { (digits_of(own.value, own.ci95).0) },
+            Some(own) => td title=(amount(own)) { "not told" },
+            None => td { "-" },
+        }
+    }
+}
+
+/// Whether the digits that the interval leaves of a value say anything.
+fn is_told(own: &ParameterEntry) -> bool {
+    digits_of(own.value, own.ci95)
+        .0
+        .parse()
+        .is_ok_and(|shown: f64| shown != 0.0 || own.value == 0.0)
+}
+
+/// What is fitted to the log of a row, on the log of a column.
+fn crossed(report: &Report) -> Markup {
+    let what = match report.compared {
+        Space::Motion => "open-loop position error at the middle horizon, rad (or m)",
+        Space::Torque => "relative torque error",
+    };
+    let error = |error: &Option<f64>| error.map_or_else(|| "-".to_owned(), small);
+    html! {
+        @if report.by_log.iter().any(|log| !log.errors.is_empty()) {
+            p { "Fitted to the log of the row, judged on that of the column: " (what) "." }
+            div.table tabindex="0" { table {
+                thead { tr { th { "fitted to" } @for log in &report.by_log { th { (log.log) } } } }
+                tbody {
+                    @for (k, log) in report.by_log.iter().enumerate() {
+                        tr {
+                            th scope="row" { (log.log) }
+                            @for (other, of_log) in log.errors.iter().enumerate() { td.own[other == k] { (error(of_log)) } }
+                        }
+                    }
+                }
+            } }
+        }
+    }
+}
+
+fn ranges(report: &Report) -> Markup {
+    html! {
+        details {
+            summary { "From run to run: ranges for domain randomisation" }
+            p { "The interval of the fit, widened by the spread between logs beyond their own intervals. " code { "ranges.json" } " holds the same." }
+            ul { @for range in &report.ranges { li { code { (range.name) } " = " (amount_of(range.value, Some(range.range), &range.unit)) } } }
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! The section of `report.md` on what the effects leave unexplained.
+
+use super::schema::Report;
+use super::wording::{FITTED, WITH_EFFECTS, capitalised, p_value};
+use residyn_core::closeloop::{Proposal, UNKNOWN};
+
+/// What is left of the residuals, and a formula for it.
+pub(super) fn remainder(report: &Report) -> String {
+    let norm = &report.residual_norm;
+    let force = |value: Option<f64>| match value {
+        Some(value) => format!("{value:.4}"),
+        None => format!(
+            "not computed ({})",
+            norm.failure.as_deref().unwrap_or_default()
+        ),
+    };
+    format!(
+        "## What is left\n\n{}\n{}\
+         Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over stretches of {} s in \
+         N m or N.\n\n\
+         ![residual](residual.svg)\n\n{}",
+        structure(report),
+        network(report),
+        force(norm.before),
+        force(norm.after),
+        report.settings.remainder.stretch_s,
+        (report.unexplained.proposal.as_ref())
+            .map(proposed)
+            .unwrap_or_default()
+    )
+}
+
+/// What the residuals show, in a sentence or two.
+pub(super) fn structure(report: &Report) -> String {
+    let left = &report.unexplained.left;
+    let settings = &report.settings.remainder;
+    let p = p_value(left.p_value);
+    let share = 100.0 * left.omnibus.most().1;
+    let structure = match left.place.as_str() {
+        UNKNOWN => format!(
+            "The residuals are not white noise ({p}; {share:.0} % of their variance exceeds it), but they are no smooth \
+             function of angle, speed, torque or time. Candidates are effects with a state or a frequency of their own: \
+             joint compliance, presliding friction, a periodic disturbance."
+        ),
+        place if left.is_significant() => format!("The remainder depends on {place} ({p})."),
+        _ if left.p_value < settings.significance => format!(
+            "The remainder has structure ({p}), but too little to matter: {share:.1} % of the residuals' variance \
+             exceeds white noise, and no probe lowers the loss by {:.0} %.",
+            100.0 * settings.noteworthy_share
+        ),
+        _ => format!("The residuals cannot be told from sensor noise ({p})."),
+    };
+    match left.fraction < 1.0 {
+        true => format!(
+            "Of the residual variance above the sensor noise, {:.1} % is left. {structure}",
+            100.0 * left.fraction
+        ),
+        false => structure,
+    }
+}
+
+/// That no network is used and why, where one was to be trained.
+pub(super) fn network(report: &Report) -> String {
+    let why = match &report.network {
+        None => return String::new(),
+        Some(check) if check.used => return String::new(),
+        Some(check) => match &check.failure {
+            None => "No residual network lowers the error on parts of the training logs that it was not trained on".to_owned(),
+            Some(failure) => format!("The training of a residual network failed ({failure})"),
+        },
+    };
+    format!("{why}: the hybrid model is the one without a network.\n")
+}
+
+fn proposed(proposal: &Proposal) -> String {
+    format!(
+        "{}.\nSupported only by its fit. As an effect file, for a folder of effects of your own:\n\n\
+         ```toml\n{}```\n\n",
+        capitalised(&proposal_line(proposal)),
+        proposal.file
+    )
+}
+
+/// `proposal, not a finding: force on joint 1 ~ -0.0012 * qd1^3 (explains 81 % of the remainder on held-out stretches)`
+pub(super) fn proposal_line(proposal: &Proposal) -> String {
+    format!(
+        "proposal, not a finding: force on joint {} ~ {} (explains {:.0} % of the remainder on held-out stretches)",
+        proposal.joint,
+        proposal.formula,
+        100.0 * proposal.explains
+    )
+}

@@ -1,0 +1,490 @@
+//! The shape of `report.json`: its types, from which `docs/report.schema.json` is derived.
+//!
+//! The comment of a field is its description in the schema.
+
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Value, json};
+
+use super::by_log::{OfLogEntry, RangeEntry};
+use super::calibration::CalibrationEntry;
+use super::shown::ShownEntry;
+use residyn_core::closeloop::{
+    Curve, NetworkCheck, Proposal, Separation, Settings, Space, SplitMethod, TestLog, Unexplained,
+    Verdict,
+};
+use residyn_core::data::{Finding as AuditFinding, Joint, Severity};
+use residyn_core::model::Call;
+use residyn_core::sim::metric::TorqueError;
+
+/// The JSON schema (draft 2020-12) of [`Report`].
+pub fn schema() -> Value {
+    let settings = SchemaSettings::draft2020_12().for_serialize();
+    let mut schema = settings.into_generator().into_root_schema_for::<Report>();
+    schema.insert(
+        "title".into(),
+        "report.json of residyn closeloop, schema 1".into(),
+    );
+    schema.into()
+}
+
+/// Fields listed here keep their names and meaning; further fields may be added.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Report {
+    /// version of these names
+    #[schemars(range(min = 1, max = 1))]
+    pub(super) schema: u32,
+    /// version of the program
+    pub(super) version: String,
+    pub(super) seed: u64,
+    /// the command with its arguments as resolved; of a program that calls the library, what it gives
+    pub(super) configuration: Value,
+    /// how the program was called; null of a program that calls the library. All else is the same each time
+    pub(super) call: Option<Call>,
+    /// every tuning constant of closing the loop
+    pub(super) settings: Settings,
+    /// name of the declared system
+    pub(super) system: String,
+    #[schemars(range(min = 1))]
+    pub(super) joints: usize,
+    /// as the model file or a URDF calls the joints, in their order; q1, q2 .. where they have no names
+    pub(super) joint_names: Vec<String>,
+    /// for each joint whether it slides (m, N) rather than turns (rad, N m)
+    pub(super) prismatic: Vec<bool>,
+    /// the quantity that logs command the joints by: `tau`, or `cmd` of a drive
+    pub(super) driven_by: String,
+    pub(super) verdict: Verdict,
+    /// the answer in a sentence
+    pub(super) headline: String,
+    /// why, in a sentence
+    pub(super) reason: String,
+    /// what the model lacks: established effects
+    pub(super) effects: Vec<EffectEntry>,
+    /// other explanations that these logs do not rule out
+    pub(super) alternatives: Vec<AlternativeEntry>,
+    /// effects that lower the error on logs left out of the fit without being established: the model has them, but
+    /// their names are not to be relied on
+    pub(super) supported: Vec<EffectEntry>,
+    pub(super) unexplained: UnexplainedEntry,
+    /// the declared equations in LaTeX, one a line; of a chain of bodies, their form
+    pub(super) equations: Vec<String>,
+    /// parameters of the declared equations, as refitted
+    pub(super) parameters: Vec<RefittedEntry>,
+    /// the model with effects, fitted to each training log alone; empty for a single log and for more than 32
+    pub(super) by_log: Vec<OfLogEntry>,
+    /// where the values of this rig lie from run to run; also in ranges.json
+    pub(super) ranges: Vec<RangeEntry>,
+    /// values in the model file that lie outside the 95 % interval of the final fit
+    pub(super) contradicted: Vec<ContradictedEntry>,
+    pub(super) identifiability: IdentifiabilityEntry,
+    /// how the fits ended that the errors and the verdict rest on
+    pub(super) fits: FitsEntry,
+    /// speeds over which the sign of each joint's velocity is smoothed in fits and predictions, rad/s or m/s
+    pub(super) sign_widths: Vec<f64>,
+    /// which errors fits lower, effects are selected by, and `error_reduction` is of
+    pub(super) compared: Space,
+    pub(super) error: ErrorEntry,
+    /// of the torques that the logged motion needs, low-passed; null for a model that gives accelerations
+    pub(super) torque: Option<TorqueEntry>,
+    /// residual generalised force, root mean square over stretches of 0.15 s, N m or N
+    pub(super) residual_norm: NormEntry,
+    pub(super) logs: LogsEntry,
+    /// what the audit found, log by log
+    pub(super) audit: Vec<AuditEntry>,
+    /// sets of effects that were fitted, one list a round of the search
+    pub(super) tried: Vec<Vec<TriedEntry>>,
+    /// number of candidates in each round
+    pub(super) candidates: Vec<usize>,
+    /// whether the search was stopped because its time was spent
+    pub(super) stopped: bool,
+    /// errors by which the residual network is used or not; null where none is trained
+    pub(super) network: Option<NetworkCheck>,
+    /// what the training logs could show, by simulations of the accepted model; null where it was not asked for
+    pub(super) calibration: Option<CalibrationEntry>,
+    pub(super) shown: ShownEntry,
+    /// paths in the folder of this report
+    pub(super) files: FilesEntry,
+}
+
+impl Report {
+    /// What makes results wrong unless something is done about it, each with its log.
+    pub(super) fn serious(&self) -> impl Iterator<Item = (&str, &AuditFinding)> {
+        self.audit
+            .iter()
+            .flat_map(|audit| {
+                let findings = audit.findings.iter();
+                findings.map(|finding| (audit.log.as_str(), finding))
+            })
+            .filter(|(_, finding)| finding.severity == Severity::Serious)
+    }
+
+    /// A joint for people: its number, with its name where it has one.
+    pub(super) fn label(&self, joint: Joint) -> String {
+        let name = Some(self.joint_names[joint.index()].as_str());
+        joint.called(name.filter(|name| *name != joint.name("q")))
+    }
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct EffectEntry {
+    pub name: String,
+    pub joint: Joint,
+    /// both joints, where the effect couples two
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joints: Option<Vec<Joint>>,
+    /// the name for people
+    pub title: String,
+    /// the joint or joints for people, with their names
+    pub place: String,
+    /// what is added, with the names of this model's parameters; of a shift, the new value
+    pub expression: String,
+    /// the expression in LaTeX; null for a shift
+    pub latex: Option<String>,
+    /// how it enters the equations
+    pub enters: String,
+    #[schemars(length(min = 1))]
+    pub parameters: Vec<ParameterEntry>,
+    #[schemars(range(min = 0, max = 1))]
+    pub p_value: f64,
+    /// share of the position error that this effect alone takes away; negative where it adds; null where the refit
+    /// without the effect failed
+    #[schemars(range(max = 1))]
+    pub error_reduction: Option<f64>,
+    /// why that refit failed
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_reduction_failure: Option<String>,
+    /// of an effect that is only supported: what is missing
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_established: Option<String>,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct ParameterEntry {
+    pub name: String,
+    /// of a parameter with one value per log: the log in which this one holds
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub log: Option<String>,
+    pub value: f64,
+    /// 95 % interval, lower end first; null for a parameter that was held, and an end is null where the logs tell none
+    #[serde(deserialize_with = "some_ends")]
+    #[schemars(with = "Option<Ends>")]
+    pub ci95: Option<[f64; 2]>,
+    pub unit: String,
+    /// whether the interval is narrower than the parameter's magnitude
+    pub identifiable: bool,
+    /// whether the fit ended at a bound of the parameter's range: the logs ask for a value beyond it
+    pub at_bound: bool,
+}
+
+/// value and ci95 are those of the final fit
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct RefittedEntry {
+    #[serde(flatten)]
+    pub fitted: ParameterEntry,
+    /// the value in the model file
+    pub declared: f64,
+    /// the value fitted without the effects
+    pub before: f64,
+}
+
+/// value and ci95 are the fitted ones
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct ContradictedEntry {
+    /// the value in the model file
+    pub declared: f64,
+    /// how the two compare, in words
+    pub comparison: String,
+    #[serde(flatten)]
+    pub fitted: ParameterEntry,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct EffectName {
+    pub name: String,
+    pub joint: Joint,
+    /// both joints, where the effect couples two
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joints: Option<Vec<Joint>>,
+    /// for people, with the joint
+    pub label: String,
+    /// of a parameter_shift: the parameter that has another value
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameter: Option<String>,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct AlternativeEntry {
+    #[schemars(length(min = 1))]
+    pub effects: Vec<EffectName>,
+    /// the name of the effect that the others do without, and its joint or joints, for people
+    pub title: String,
+    pub place: String,
+    pub reason: String,
+    /// the experiment that would tell, in a sentence
+    pub experiment: String,
+    /// its figures, from simulation; null for alternatives that others come before
+    pub separation: Option<Separation>,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct UnexplainedEntry {
+    #[serde(flatten)]
+    pub left: Unexplained,
+    /// residual generalised force as a function of each variable alone, with a pointwise 95 % band
+    pub curves: Vec<Curve>,
+    /// null where nothing is left or nothing fits it
+    pub proposal: Option<Proposal>,
+}
+
+/// the fit of the declared model, and the final one with the effects
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct FitsEntry {
+    /// values that the fit of the declared parameters began with, as pairs of parameter and value, where the model
+    /// diverges with those in its file; else empty
+    pub moved_to: Vec<(String, f64)>,
+    pub before: FitEntry,
+    pub after: FitEntry,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct FitEntry {
+    pub converged: bool,
+    /// why the fit ended
+    pub termination: String,
+    /// steps that were taken
+    pub steps: usize,
+    /// loss after each step, in units of the sensors' noise
+    pub trace: Vec<f64>,
+    /// condition number of the normal equations, as they are and in units in which each value alone has the same
+    /// information; null where they are singular
+    pub condition: [Option<f64>; 2],
+}
+
+/// what the logs determine of the declared parameters
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct IdentifiabilityEntry {
+    /// number of parameters that are not fixed
+    pub free: usize,
+    /// number of their combinations that the logs determine
+    pub determined: usize,
+    /// combinations that the logs do not determine, as pairs of parameter and weight
+    pub undetermined: Vec<Vec<(String, f64)>>,
+    /// parameters held for that reason
+    pub held: Vec<String>,
+    /// what the logs tell of the bodies of a chain, where torques were compared
+    pub bodies: Vec<CombinationEntry>,
+    /// how many sums of the bodies' parameters any motion could tell
+    pub tellable: usize,
+}
+
+/// a sum of bodies' parameters that the logs tell
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct CombinationEntry {
+    /// number of its first body, 1 next to the base
+    pub body: usize,
+    /// parameters with their weights
+    pub sum: Vec<(String, f64)>,
+    /// at the values in the model file
+    pub declared: f64,
+    pub value: f64,
+    /// 95 % interval, lower end first; an end is null where the logs tell none
+    #[serde(deserialize_with = "ends")]
+    #[schemars(with = "Ends")]
+    pub ci95: [f64; 2],
+    pub unit: String,
+}
+
+/// error of the torques that the logged motion needs, on the test logs
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct TorqueEntry {
+    pub as_declared: TorqueError,
+    pub before: TorqueError,
+    /// with Coulomb and viscous friction on every joint, fitted; null where the declared model has both
+    pub with_friction: Option<TorqueError>,
+    pub after: TorqueError,
+    /// 95 % interval of the relative reduction of the error, before to after
+    pub reduction_ci95: Option<[f64; 2]>,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct ErrorEntry {
+    #[schemars(extend("const" = "test"))]
+    pub logs: String,
+    /// test logs that are training logs once more: they were fitted, and their errors test nothing; left out where there are
+    /// none
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fitted_logs: Vec<String>,
+    #[schemars(length(min = 1), extend("items" = json!({"type": "number", "exclusiveMinimum": 0})))]
+    pub horizons_s: Vec<f64>,
+    /// horizons that were asked for, but are longer than any stretch of the test logs
+    pub unscored_s: Vec<f64>,
+    /// the declared model with the values in its file, before any fit
+    pub declared: ModelError,
+    /// the declared model, its own parameters fitted
+    pub before: ModelError,
+    /// the declared model with Coulomb and viscous friction on every joint, fitted: what most would try first; null where it
+    /// has both
+    pub with_friction: Option<ModelError>,
+    /// the declared model with the effects added, refitted
+    pub after: ModelError,
+    /// the same with the zeros of each test log's sensors estimated on its first second, scored on the rest; null where
+    /// no zero differs from log to log
+    pub zeroed: Option<ModelError>,
+    /// with a network trained on what is left; null where none was trained
+    pub hybrid: Option<ModelError>,
+    /// the models given to compare with, as they are
+    pub against: Vec<ContenderEntry>,
+    /// 95 % interval of the relative reduction of the position error, before to after; null where the logs are too few
+    pub reduction_ci95: Option<[f64; 2]>,
+    /// the errors that are compared, on each test log; empty for a single one
+    pub by_log: Vec<TestLog>,
+    /// integrator step of the declared model or of that with effects, the shorter one, s
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub integrator_step_s: f64,
+}
+
+impl ErrorEntry {
+    /// Place of the middle horizon, and the horizon in s.
+    pub fn middle(&self) -> (usize, f64) {
+        let place = self.horizons_s.len() / 2;
+        (place, self.horizons_s[place])
+    }
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct ContenderEntry {
+    /// as given on the command line
+    pub name: String,
+    #[serde(flatten)]
+    pub error: ModelError,
+}
+
+/// open-loop errors; one inner list a horizon, one number a joint
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct ModelError {
+    /// root mean square over all rows of all windows, rad or m
+    #[schemars(length(min = 1), inner(length(min = 1), inner(range(min = 0))))]
+    pub position_rmse: Vec<Vec<f64>>,
+    /// median over the windows of a window's own root mean square, rad or m
+    #[schemars(length(min = 1), inner(length(min = 1), inner(range(min = 0))))]
+    pub position_median: Vec<Vec<f64>>,
+    /// as position_rmse, rad/s or m/s
+    #[schemars(length(min = 1), inner(length(min = 1), inner(range(min = 0))))]
+    pub velocity_rmse: Vec<Vec<f64>>,
+    /// windows scored, one number a horizon
+    #[schemars(length(min = 1))]
+    pub windows: Vec<usize>,
+    /// windows in which the model diverged, one number a horizon; they count
+    #[schemars(length(min = 1))]
+    pub diverged: Vec<usize>,
+}
+
+impl ModelError {
+    /// Position error of all joints together at a horizon: root of the mean over rows of the sum over joints, rad (or m).
+    pub fn of_all(&self, horizon: usize) -> f64 {
+        let squares = self.position_rmse[horizon].iter().map(|rmse| rmse * rmse);
+        squares.sum::<f64>().sqrt()
+    }
+}
+
+/// null where the fit of the force failed
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct NormEntry {
+    /// of the declared model, fitted
+    #[schemars(range(min = 0))]
+    pub before: Option<f64>,
+    /// of the model with the effects
+    #[schemars(range(min = 0))]
+    pub after: Option<f64>,
+    /// why the first of them that is null was not computed
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct LogsEntry {
+    pub train: Vec<LogEntry>,
+    pub test: Vec<LogEntry>,
+    pub split: SplitMethod,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct LogEntry {
+    pub name: String,
+    pub rows: usize,
+    pub start_s: f64,
+    pub end_s: f64,
+    /// intervals left out, start and end in s
+    pub leave_out: Vec<[f64; 2]>,
+    /// angles that jump for a single row, one number a joint: masked in fits, scored in test logs
+    pub jumps: Vec<usize>,
+    /// rows that the logger dropped: put in or left out in fits; in test logs the torque is held over them
+    pub dropped_rows: usize,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct AuditEntry {
+    pub log: String,
+    pub findings: Vec<AuditFinding>,
+    /// the log whose motion this one has once more
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeats: Option<String>,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct TriedEntry {
+    pub effects: Vec<EffectName>,
+    /// relative fall of the loss on held-out stretches, from that of the set which the round began with
+    #[schemars(range(max = 1))]
+    pub gain: f64,
+    /// whether the next round begins with it
+    pub chosen: bool,
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct FilesEntry {
+    pub model: String,
+    pub report: String,
+    /// the report for a browser, in one file
+    pub page: String,
+    pub checkpoint: Option<String>,
+    pub plots: Vec<String>,
+}
+
+/// An interval in JSON, which has no infinite numbers.
+pub(super) type Ends = [Option<f64>; 2];
+
+pub(super) fn ends<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 2], D::Error> {
+    Ends::deserialize(from).map(infinite_where_null)
+}
+
+fn some_ends<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 2]>, D::Error> {
+    Ok(Option::<Ends>::deserialize(from)?.map(infinite_where_null))
+}
+
+fn infinite_where_null([low, high]: Ends) -> [f64; 2] {
+    [
+        low.unwrap_or(f64::NEG_INFINITY),
+        high.unwrap_or(f64::INFINITY),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::schema;
+
+    #[test]
+    fn the_published_schema_is_that_of_the_types() {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../../");
+        let derived = serde_json::to_string_pretty(&schema()).unwrap() + "\n";
+        let published = std::fs::read_to_string(format!("{root}docs/report.schema.json")).unwrap();
+        if derived != published {
+            let fresh = format!("{root}target/report.schema.json");
+            std::fs::write(&fresh, &derived).unwrap();
+            panic!(
+                "docs/report.schema.json is not the schema of the types; put {fresh} in its place"
+            );
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Whether the answer is to be trusted, in a few lines.
+
+use super::paragraph;
+use crate::calibration;
+use crate::remainder::{proposal_line, structure};
+use crate::schema::{EffectEntry, Report};
+
+/// Remarks beside what is left.
+const REMARKS: usize = 2;
+
+pub(super) fn lines(report: &Report) -> Vec<String> {
+    let remarks = [
+        harmful(report),
+        calibrated(report),
+        held(report),
+        rivals(report),
+        supported(report),
+        proposal(report),
+    ];
+    let remarks = remarks.into_iter().flatten().take(REMARKS);
+    let remarks = remarks.flat_map(|text| paragraph("  ", &text));
+    let title = vec!["May I trust it?".to_owned()];
+    [title, paragraph("  ", &structure(report))]
+        .into_iter()
+        .flatten()
+        .chain(remarks)
+        .collect()
+}
+
+/// Effects that are told by the training logs, and raise the error on the test logs by more than a percent.
+fn harmful(report: &Report) -> Option<String> {
+    let raise = |effect: &EffectEntry| {
+        let rise = -effect.error_reduction?;
+        let told = || {
+            format!(
+                "{} on joint {} (by {:.0} %)",
+                effect.title,
+                effect.place,
+                100.0 * rise
+            )
+        };
+        (rise > 0.01).then(told)
+    };
+    let effects: Vec<String> = report.effects.iter().filter_map(raise).collect();
+    (!effects.is_empty())
+        .then(|| format!("raise the error on the test logs: {}", effects.join(", ")))
+}
+
+fn calibrated(report: &Report) -> Option<String> {
+    report.calibration.as_ref().map(calibration::line)
+}
+
+fn held(report: &Report) -> Option<String> {
+    let known = &report.identifiability;
+    (!known.held.is_empty()).then(|| {
+        format!(
+            "held, since the logs do not tell them: {}",
+            known.held.join(", ")
+        )
+    })
+}
+
+fn rivals(report: &Report) -> Option<String> {
+    let rivals = report.alternatives.iter();
+    let rivals: Vec<String> = rivals
+        .map(|rival| format!("{} on joint {}", rival.title, rival.place))
+        .collect();
+    (!rivals.is_empty()).then(|| format!("not ruled out: {}", rivals.join(", ")))
+}
+
+fn supported(report: &Report) -> Option<String> {
+    let effects = report.supported.iter();
+    let effects: Vec<String> = effects
+        .map(|effect| format!("{} on joint {}", effect.title, effect.place))
+        .collect();
+    (!effects.is_empty()).then(|| format!("in the model, not established: {}", effects.join(", ")))
+}
+
+fn proposal(report: &Report) -> Option<String> {
+    report.unexplained.proposal.as_ref().map(proposal_line)
+}

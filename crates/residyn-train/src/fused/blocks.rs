@@ -1,0 +1,99 @@
+use residyn_core::lanes::Row;
+use residyn_core::sim::batch::{Rows, W};
+
+/// Segments in blocks of [`W`], one in each lane. The last segment is repeated to fill the last block, where the
+/// copies do not count.
+#[derive(Debug)]
+pub struct Blocks {
+    pub(super) joints: usize,
+    pub(super) steps: usize,
+    /// Number of segments.
+    pub(super) size: usize,
+    rows: Vec<Rows>,
+    /// 1 where a row of the last block counts, else 0.
+    last: Rows,
+}
+
+/// The data of one step.
+pub(super) struct StepData<'a> {
+    /// `2n`, at its start.
+    pub state: &'a [Rows],
+    /// `n`, held.
+    pub input: &'a [Rows],
+    /// s
+    pub dt: &'a Rows,
+    /// When the step begins, s.
+    pub time: &'a Rows,
+    /// `2n`, at its end.
+    pub next: &'a [Rows],
+}
+
+impl Blocks {
+    /// Blocks of `size` segments; `values` are those of a segment: for each step the state, the input, the length and
+    /// the start of the step, and after them the last state.
+    pub(crate) fn new(
+        joints: usize,
+        steps: usize,
+        size: usize,
+        segment: impl Fn(usize) -> Vec<f32>,
+    ) -> Self {
+        let mut blocks = Self {
+            joints,
+            steps,
+            size,
+            rows: Vec::new(),
+            last: Rows::splat(0.0),
+        };
+        let (count, stride) = (blocks.count(), blocks.stride());
+        blocks.rows.resize(count * stride, Rows::splat(0.0));
+        blocks.last[..size - (count - 1) * W].fill(1.0);
+        for (block, rows) in blocks.rows.chunks_mut(stride).enumerate() {
+            for lane in 0..W {
+                let values = segment((block * W + lane).min(size - 1));
+                for (rows, value) in rows.iter_mut().zip(values) {
+                    rows[lane] = value;
+                }
+            }
+        }
+        blocks
+    }
+
+    /// Number of blocks.
+    pub(super) fn count(&self) -> usize {
+        self.size.div_ceil(W)
+    }
+
+    /// 1 in the rows of a block that count, else 0.
+    pub(super) fn counted(&self, block: usize) -> &Rows {
+        const ALL: &Rows = &Row([1.0; W]);
+        if block + 1 < self.count() {
+            ALL
+        } else {
+            &self.last
+        }
+    }
+
+    /// The data of step `k`.
+    #[inline(always)]
+    pub(super) fn step(&self, block: usize, k: usize) -> StepData<'_> {
+        let (n, stride, step) = (self.joints, self.stride(), self.step_rows());
+        let rows = &self.rows[block * stride + k * step..][..step + 2 * n];
+        StepData {
+            state: &rows[..2 * n],
+            input: &rows[2 * n..3 * n],
+            dt: &rows[3 * n],
+            time: &rows[3 * n + 1],
+            next: &rows[step..],
+        }
+    }
+
+    /// Rows of a step.
+    fn step_rows(&self) -> usize {
+        3 * self.joints + 2
+    }
+
+    /// Rows of a block.
+    fn stride(&self) -> usize {
+        self.steps * self.step_rows() + 2 * self.joints
+    }
+}

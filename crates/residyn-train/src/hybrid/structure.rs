@@ -1,0 +1,138 @@
+use residyn_core::expr::{Graph, Node, Program};
+use residyn_core::model::{Dynamics, MlpWeights, Parameter, nothing_but};
+
+/// A hybrid model without its learnable numbers: declared equations and networks, and one program, with its derivative,
+/// for everything but the networks.
+#[derive(Debug)]
+pub(crate) struct Structure {
+    /// Name of the system.
+    pub system: String,
+    pub joints: usize,
+    /// The prior as declared, if it is equations.
+    pub equations: Option<Dynamics>,
+    /// The networks whose outputs are added to the last of the rates: the prior, where it is one, and the residual.
+    pub networks: Vec<MlpWeights>,
+    /// Whether the last network is a residual.
+    pub has_residual: bool,
+    /// Inputs as in [`Dynamics`]. Outputs: `2n` rates without the networks, then the scaled features of each network.
+    pub program: Program,
+    /// The reverse derivative of `program`. Inputs: those of `program`, with the derivatives of a quantity by each output
+    /// before the parameters. Outputs: its derivatives by the `2n` states, then by each parameter that is not fixed.
+    pub adjoint: Program,
+    /// `adjoint` by the parameters alone.
+    pub parameter_adjoint: Program,
+}
+
+impl Structure {
+    /// Equations alone.
+    pub(super) fn of_equations(dynamics: &Dynamics) -> Self {
+        let (system, joints) = (dynamics.name.clone(), dynamics.joints);
+        Self::new(system, joints, Some(dynamics.clone()), Vec::new(), false)
+    }
+
+    /// A network alone.
+    pub(super) fn of_network(system: &str, joints: usize, prior: &MlpWeights) -> Self {
+        Self::new(system.to_owned(), joints, None, vec![prior.clone()], false)
+    }
+
+    /// The same with this residual in place of any other.
+    pub(super) fn with_residual(&self, residual: &MlpWeights) -> Self {
+        let mut networks = self.networks.clone();
+        networks.truncate(usize::from(self.equations.is_none()));
+        networks.push(residual.clone());
+        let (system, equations) = (self.system.clone(), self.equations.clone());
+        Self::new(system, self.joints, equations, networks, true)
+    }
+
+    /// The physical parameters as declared; none where the prior is a network.
+    pub(crate) fn parameters(&self) -> &[Parameter] {
+        let equations = self.equations.as_ref();
+        equations.map_or(&[], |dynamics| &dynamics.parameters)
+    }
+
+    fn new(
+        system: String,
+        joints: usize,
+        equations: Option<Dynamics>,
+        networks: Vec<MlpWeights>,
+        has_residual: bool,
+    ) -> Self {
+        let parameters = equations.as_ref().map_or(&[][..], |d| &d.parameters);
+        let mut builder = Builder::new(joints, parameters);
+        let mut outputs = match &equations {
+            Some(dynamics) => builder.append(&dynamics.program),
+            None => builder.append(&nothing_but(&system, joints, networks[0].on).program),
+        };
+        for network in &networks {
+            outputs.extend(builder.features(network));
+        }
+        let program = builder.graph.finish(&outputs);
+        let (adjoint, parameter_adjoint) = adjoints(&program, joints, parameters);
+        Self {
+            system,
+            joints,
+            equations,
+            networks,
+            has_residual,
+            program,
+            adjoint,
+            parameter_adjoint,
+        }
+    }
+}
+
+/// The program under construction.
+struct Builder {
+    graph: Graph,
+    joints: usize,
+    inputs: Vec<Node>,
+}
+
+impl Builder {
+    fn new(joints: usize, parameters: &[Parameter]) -> Self {
+        let mut graph = Graph::new();
+        let mut inputs = Vec::new();
+        for stem in ["q", "qd", "tau"] {
+            inputs.extend((1..=joints).map(|j| graph.input(&format!("{stem}{j}"))));
+        }
+        inputs.push(graph.input("t"));
+        inputs.extend(parameters.iter().map(|p| graph.input(&p.name)));
+        Self {
+            graph,
+            joints,
+            inputs,
+        }
+    }
+
+    fn append(&mut self, program: &Program) -> Vec<Node> {
+        self.graph.append(program, &self.inputs)
+    }
+
+    fn features(&mut self, network: &MlpWeights) -> Vec<Node> {
+        let n = self.joints;
+        let (q, qd, tau) = (
+            &self.inputs[..n],
+            &self.inputs[n..2 * n],
+            &self.inputs[2 * n..3 * n],
+        );
+        network.features(&mut self.graph, q, qd, tau)
+    }
+}
+
+/// The derivatives of a program by states and free parameters, and by the latter alone.
+fn adjoints(program: &Program, joints: usize, parameters: &[Parameter]) -> (Program, Program) {
+    let mut graph = Graph::new();
+    let (of_point, of_parameters) = program.inputs().split_at(3 * joints + 1);
+    let mut inputs: Vec<Node> = of_point.iter().map(|name| graph.input(name)).collect();
+    let seeds: Vec<Node> = (0..program.output_count())
+        .map(|k| graph.input(&format!("by output {k}")))
+        .collect();
+    inputs.extend(of_parameters.iter().map(|name| graph.input(name)));
+    let outputs = graph.append(program, &inputs);
+    let mut by = inputs[..2 * joints].to_vec();
+    let free = inputs[of_point.len()..].iter().zip(parameters);
+    by.extend(free.filter(|(_, p)| !p.fixed).map(|(node, _)| *node));
+    let slopes = graph.gradient(&outputs, &seeds, &by);
+    let by_parameters = graph.clone().finish(&slopes[2 * joints..]);
+    (graph.finish(&slopes), by_parameters)
+}

@@ -1,0 +1,77 @@
+//! What an optimiser remembers, as Burn's records have it (`optimizer.bpk`).
+
+use std::collections::HashMap;
+
+use burn::module::{Module, ModuleVisitor, Param};
+use burn::optim::{ModuleOptimizer, OptimizerRecord};
+use burn::tensor::{Bytes, Tensor};
+use burn_pack::{Reader, Writer};
+
+use super::packed::Packed;
+use residyn_io::guarded::guarded;
+
+/// The bytes of the record. Its tensors come in the order of their names: an optimiser keeps them in one that changes from
+/// run to run, and the same run gives the same file.
+pub(super) fn to_bytes(optimizer: &ModuleOptimizer) -> Vec<u8> {
+    let ordered = || -> Result<Bytes, burn_pack::Error> {
+        let bytes = optimizer.into_bytes();
+        let reader = Reader::from_bytes(bytes.expect("a record in memory is written"))?;
+        let (scalars, paths) = (reader.scalars().clone(), reader.metadata().clone());
+        let mut writer = Writer::new(reader.into_tensors()?);
+        for (name, value) in scalars {
+            writer = writer.with_scalar(&name, value);
+        }
+        for (name, path) in paths {
+            writer = writer.with_metadata(&name, &path);
+        }
+        writer.into_bytes()
+    };
+    ordered().expect("a record in memory is read back").to_vec()
+}
+
+/// The optimiser with what the record of a run with these numbers remembers.
+///
+/// # Errors
+/// What is wrong with bytes that are no such record.
+pub(super) fn from_bytes(
+    optimizer: ModuleOptimizer,
+    bytes: &[u8],
+    numbers: &Packed,
+) -> Result<ModuleOptimizer, String> {
+    check(bytes, numbers)?;
+    // Burn takes for granted that a record belongs to the optimiser.
+    let read = || {
+        let record = OptimizerRecord::from_bytes(Bytes::from_bytes_vec(bytes.to_vec()));
+        record.map(|record| optimizer.load_record(record))
+    };
+    match guarded(read) {
+        Some(read) => read.map_err(|error| error.to_string()),
+        None => Err("it is of another optimiser".to_owned()),
+    }
+}
+
+/// That every tensor of a record is as long as what it is remembered of.
+fn check(bytes: &[u8], numbers: &Packed) -> Result<(), String> {
+    let mut shapes = Shapes::default();
+    numbers.visit(&mut shapes);
+    let reader = Reader::from_bytes(Bytes::from_bytes_vec(bytes.to_vec()));
+    let tensors = reader.and_then(Reader::into_tensors);
+    for tensor in tensors.map_err(|error| error.to_string())? {
+        let (name, _, shape, id, _) = tensor.into_parts().map_err(|error| error.to_string())?;
+        let known = id.and_then(|id| shapes.0.get(&id));
+        if known.is_none_or(|known| **known != *shape) {
+            return Err(format!("its tensor `{name}` is of another model"));
+        }
+    }
+    Ok(())
+}
+
+/// The shape of each tensor, by its identifier.
+#[derive(Default)]
+struct Shapes(HashMap<u64, Vec<usize>>);
+
+impl ModuleVisitor for Shapes {
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        self.0.insert(param.id.val(), param.dims().to_vec());
+    }
+}

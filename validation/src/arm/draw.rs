@@ -1,0 +1,123 @@
+//! What an arm hides, drawn by chance in sizes that geared arms have.
+
+use rand::{Rng, RngExt};
+
+use super::bodies::Bodies;
+use super::motion::Motion;
+use super::{Arm, Lacks};
+use crate::hidden::Hidden;
+use residyn_core::data::Joint;
+
+/// Friction in shares of what the motion of the bodies takes of a joint, root mean square, or of a twentieth of what it takes of
+/// the strongest joint where that is more: wrists have more friction than load.
+const SHARES: [f64; 2] = [0.08, 0.3];
+const LEAST: f64 = 0.05;
+
+/// Seconds over which these are taken.
+const SECONDS: u32 = 20;
+
+impl Arm {
+    pub(super) fn draw(&self, bodies: &Bodies, motion: &Motion, rng: &mut impl Rng) -> Vec<Hidden> {
+        if self.lacks == Lacks::Nothing {
+            return Vec::new();
+        }
+        let (sizes, speeds) = typical(bodies, motion);
+        let joints: Vec<Joint> = Joint::all(sizes.len()).collect();
+        let mut effects: Vec<Hidden> = joints
+            .iter()
+            .map(|joint| friction(*joint, sizes[*joint], speeds[*joint], rng))
+            .collect();
+        let last = joints.len() - 1;
+        match self.lacks {
+            Lacks::Nothing | Lacks::Friction => {}
+            Lacks::LoadFriction => {
+                // Where the bodies load a gear.
+                let joint = joints[rng.random_range(1..3)];
+                effects.push(hidden(
+                    "load_friction",
+                    joint,
+                    &[("k", rng.random_range(0.06..0.2))],
+                ));
+            }
+            Lacks::Coupling => {
+                let joint = joints[last - rng.random_range(1..=2)];
+                let size = sizes[joint].max(sizes[joint.next()]);
+                let speed = speeds[joint].max(speeds[joint.next()]);
+                let ratio = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+                let mut share = || rng.random_range(0.1..0.3) * size;
+                let values = [
+                    ("F_c", share()),
+                    ("b", share() / speed),
+                    ("J", 0.1 * share() / speed.powi(2)),
+                    ("r", ratio),
+                ];
+                effects.push(hidden("joint_coupling", joint, &values));
+            }
+            Lacks::Payload => {
+                let (mass, reach) = bodies.tip();
+                let values = [
+                    ("m", mass * rng.random_range(1.5..4.0)),
+                    ("x", reach * rng.random_range(-1.0..1.0)),
+                    ("y", reach * rng.random_range(-1.0..1.0)),
+                    ("z", reach + rng.random_range(0.05..0.15)),
+                ];
+                effects.push(hidden("payload", joints[last], &values));
+            }
+        }
+        effects
+    }
+}
+
+/// One of four kinds of friction.
+fn friction(joint: Joint, size: f64, speed: f64, rng: &mut impl Rng) -> Hidden {
+    let level = size * rng.random_range(SHARES[0]..SHARES[1]);
+    let slow = speed * rng.random_range(0.05..0.2);
+    match rng.random_range(0..4) {
+        0 => hidden("viscous_friction", joint, &[("b", level / speed)]),
+        1 => hidden("coulomb_friction", joint, &[("F_c", level)]),
+        2 => {
+            let more = level * rng.random_range(1.5..2.5);
+            let values = [("F_c", level), ("F_s", more), ("v_s", slow)];
+            hidden("stribeck_friction", joint, &values)
+        }
+        _ => {
+            // Its level at the typical speed is the one drawn.
+            let rise = level / (speed / slow).asinh();
+            hidden(
+                "degressive_friction",
+                joint,
+                &[("F_d", rise), ("v_d", slow)],
+            )
+        }
+    }
+}
+
+fn hidden(name: &str, joint: Joint, values: &[(&str, f64)]) -> Hidden {
+    let own = values
+        .iter()
+        .map(|(name, value)| ((*name).to_owned(), *value));
+    Hidden {
+        name: name.to_owned(),
+        joint,
+        values: own.collect(),
+    }
+}
+
+/// For each joint the torque (N m) by which friction is drawn, and the root mean square of its speed (rad/s).
+fn typical(bodies: &Bodies, motion: &Motion) -> (Vec<f64>, Vec<f64>) {
+    let times = (0..20 * SECONDS).map(|k| f64::from(k) / 20.0);
+    let at = |time| {
+        let [q, qd, qdd] = motion.at(time);
+        (bodies.torques(&q, &qd, &qdd), qd)
+    };
+    let (torques, speeds): (Vec<Vec<f64>>, Vec<Vec<f64>>) = times.map(at).unzip();
+    let rms = |rows: &[Vec<f64>]| -> Vec<f64> {
+        let mean =
+            |j: usize| rows.iter().map(|row| row[j].powi(2)).sum::<f64>() / rows.len() as f64;
+        (0..rows[0].len()).map(|j| mean(j).sqrt()).collect()
+    };
+    let torques = rms(&torques);
+    let strongest = torques.iter().copied().fold(0.0, f64::max);
+    let sizes = torques.iter().map(|torque| torque.max(LEAST * strongest));
+    (sizes.collect(), rms(&speeds))
+}

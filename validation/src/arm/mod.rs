@@ -1,0 +1,128 @@
+//! Arms of many joints under stiff control: a motion that is prescribed, and the torques that it takes.
+
+mod bodies;
+mod draw;
+mod friction;
+mod motion;
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use self::bodies::Bodies;
+use self::friction::Friction;
+use self::motion::Motion;
+use super::hidden::Hidden;
+use super::recording::log_name;
+use residyn_core::data::Log;
+use residyn_core::model::Model;
+
+/// What an arm hides beside bodies that are not as they were drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Lacks {
+    Nothing,
+    /// One of four kinds on every joint.
+    Friction,
+    /// The same, and friction by the load of one joint.
+    LoadFriction,
+    /// The same, and a motor that turns with two joints.
+    Coupling,
+    /// The same, and a load at the tip.
+    Payload,
+}
+
+impl Lacks {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Nothing => "nothing",
+            Self::Friction => "friction",
+            Self::LoadFriction => "load_friction",
+            Self::Coupling => "coupling",
+            Self::Payload => "payload",
+        }
+    }
+}
+
+/// An arm of the bench.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Arm {
+    pub lacks: Lacks,
+    /// Bodies are off by shares of their mass and size within this range, up or down.
+    pub bodies: [f64; 2],
+    /// Largest amplitude of each joint, rad.
+    pub amplitude: Vec<f64>,
+    pub rate_hz: f64,
+    /// Length of each log \[s\]; the last one is the test.
+    pub seconds: Vec<f64>,
+    /// Noise of angles \[rad\], and of torques as a share of their root mean square.
+    pub noise: [f64; 2],
+}
+
+impl Arm {
+    /// What this arm hides.
+    ///
+    /// # Errors
+    /// A model that is no chain of bodies.
+    pub(crate) fn hidden(&self, model: &Model, rng: &mut impl Rng) -> Result<Vec<Hidden>, String> {
+        let bodies = Bodies::of(model).ok_or("its model is no chain of bodies")?;
+        let motion = Motion::draw(&self.amplitude, rng);
+        Ok(self.draw(&bodies, &motion, rng))
+    }
+
+    /// Logs of the arm with these effects, on bodies that are off.
+    ///
+    /// # Errors
+    /// As [`Arm::hidden`], and effects that an arm cannot have.
+    pub(crate) fn record(
+        &self,
+        model: &Model,
+        effects: &[Hidden],
+        rng: &mut impl Rng,
+    ) -> Result<Vec<Log>, String> {
+        let drawn = Bodies::of(model).ok_or("its model is no chain of bodies")?;
+        let mut bodies = drawn.off_by(self.bodies, rng);
+        let friction = Friction::of(effects, model.joints, &mut bodies)?;
+        let lengths = self.seconds.iter().enumerate();
+        let logs = lengths.map(|(index, seconds)| {
+            let motion = Motion::draw(&self.amplitude, rng);
+            let mut log = self.run(&bodies, &friction, &motion, *seconds);
+            self.add_noise(&mut log, rng);
+            log.path = log_name(index).into();
+            log
+        });
+        Ok(logs.collect())
+    }
+
+    fn run(&self, bodies: &Bodies, friction: &Friction, motion: &Motion, seconds: f64) -> Log {
+        let mut log = Log::empty(self.amplitude.len());
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some thousand rows
+        let rows = (self.rate_hz * seconds) as usize;
+        for row in 0..rows {
+            let time = row as f64 / self.rate_hz;
+            let [q, qd, qdd] = motion.at(time);
+            let tau = friction.commanded(&bodies.torques(&q, &qd, &qdd), &qd, &qdd);
+            log.time.push(time);
+            for (channels, values) in [(&mut log.q, q), (&mut log.qd, qd), (&mut log.tau, tau)] {
+                channels.iter_mut().zip(values).for_each(|(c, v)| c.push(v));
+            }
+        }
+        log
+    }
+
+    fn add_noise(&self, log: &mut Log, rng: &mut impl Rng) {
+        let [of_angles, of_torques] = self.noise;
+        let mut add = |values: &mut Vec<f64>, deviation: f64| {
+            for value in values {
+                let drawn: f64 = StandardNormal.sample(rng);
+                *value += deviation * drawn;
+            }
+        };
+        for (q, tau) in log.q.iter_mut().zip(&mut log.tau) {
+            let mean = tau.iter().map(|tau| tau * tau).sum::<f64>() / tau.len() as f64;
+            add(q, of_angles);
+            add(tau, of_torques * mean.sqrt());
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! One cell: record its logs, close the loop, fit the true structure for comparison, judge.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, anyhow};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use super::answer::answer;
+use super::coverage::Coverage;
+use super::draw::Drawn;
+use super::grid::{Cell, Group, Simulation, Source};
+use super::hidden::Hidden;
+use super::judge::{Answer, Judgement, Truth, judge};
+use super::machine::Machine;
+use super::mechanics::Pair;
+use super::told::Told;
+use residyn_core::closeloop::{Outcome, Request, Settings, Split, StudyError, close_loop};
+use residyn_core::data::{Log, LogError};
+use residyn_core::model::{Library, Model};
+use residyn_io::files::content_hash;
+use residyn_io::read_log;
+use residyn_io::read_model;
+
+/// The result of a cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Findings {
+    /// Of closing the loop.
+    Searched(Box<Searched>),
+    /// Of the fit that is told the true structure.
+    Told(KnownStructure),
+}
+
+/// What closing the loop found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Searched {
+    pub truth: Truth,
+    pub answer: Answer,
+    pub judgement: Judgement,
+    pub errors: Errors,
+}
+
+/// What the fit of the true structure found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KnownStructure {
+    pub truth: Truth,
+    /// Open-loop position error on the test log, 0.5 s ahead, all joints together \[rad\].
+    pub error: f64,
+    pub coverage: Vec<Coverage>,
+}
+
+/// Open-loop position error on the test log, 0.5 s ahead, all joints together \[rad\].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    pub before: f64,
+    pub after: f64,
+    /// Of the model with the true effects, fitted to the same logs; `None` where the library lacks one of them.
+    pub told: Option<f64>,
+}
+
+impl Errors {
+    /// How the error with the effects found compares with that of the true structure.
+    pub fn ratio(&self) -> Option<f64> {
+        self.told.map(|told| self.after / told)
+    }
+}
+
+/// All logs but the last to learn from, the last to be judged on.
+pub fn last_is_test(logs: Vec<Log>) -> Split {
+    let mut split = Split::given(logs, Vec::new());
+    split.test.extend(split.train.pop());
+    split
+}
+
+impl Cell {
+    /// The cell with its rig drawn, where it is to be drawn.
+    ///
+    /// # Errors
+    /// A model file that cannot be read, or rules by which no rig can be drawn.
+    pub fn settled(&self, library: &Library) -> anyhow::Result<Self> {
+        let mut rng =
+            ChaCha8Rng::seed_from_u64(content_hash(format!("{}: rig", self.id).as_bytes()));
+        let recipe = match &self.source {
+            Source::Drawn(recipe) => recipe,
+            Source::Arm(arm) => {
+                let effects = arm.hidden(&read_model(&self.model, library)?, &mut rng);
+                let effects = effects.map_err(|message| anyhow!("{}: {message}", self.id))?;
+                return Ok(Self {
+                    effects,
+                    ..self.clone()
+                });
+            }
+            Source::Simulated(_) | Source::Files { .. } => return Ok(self.clone()),
+        };
+        let model = read_model(&self.model, library)?;
+        let drawn = recipe.settle(self, &model, library, &mut rng)?;
+        let mut settled = self.drawn(&drawn, &drawn.effects);
+        let (_, truth) = settled.record(&model)?;
+        settled.start = recipe.start(&model, &truth.declared, &mut rng)?;
+        Ok(settled)
+    }
+
+    /// Number of joints, where the rig is simulated.
+    pub fn joints(&self) -> Option<usize> {
+        match &self.source {
+            Source::Simulated(simulation) => Some(simulation.mechanics.joints()),
+            Source::Drawn(recipe) => Some(recipe.mechanics.joints()),
+            Source::Arm(arm) => Some(arm.amplitude.len()),
+            Source::Files { .. } => None,
+        }
+    }
+
+    /// The cell with a drawn rig that has these effects.
+    pub(super) fn drawn(&self, drawn: &Drawn, effects: &[Hidden]) -> Self {
+        Self {
+            effects: effects.to_vec(),
+            source: Source::Simulated(Box::new(drawn.simulation.clone())),
+            ..self.clone()
+        }
+    }
+
+    /// The declared model.
+    ///
+    /// # Errors
+    /// A model file that cannot be read.
+    pub fn declared(&self, library: &Library) -> anyhow::Result<Model> {
+        let mut model = read_model(&self.model, library)?;
+        for (name, value) in &self.start {
+            let mut parameters = model.parameters.iter_mut();
+            let parameter = parameters.find(|parameter| parameter.name == *name);
+            let unknown = || format!("{}: no parameter `{name}`", self.model.display());
+            parameter.with_context(unknown)?.value = *value;
+        }
+        Ok(model)
+    }
+
+    /// The logs of the cell and the truth behind them.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or a rig that has not been drawn.
+    ///
+    /// # Panics
+    /// Never: the effects were checked when the grid was read.
+    pub fn record(&self, model: &Model) -> anyhow::Result<(Vec<Log>, Truth)> {
+        match &self.source {
+            Source::Files { logs, declared } => {
+                let read = |path| read_log(path, model);
+                let logs = logs.iter().map(read).collect::<Result<_, LogError>>()?;
+                Ok((logs, Truth::of(&self.effects, declared.clone(), &[])))
+            }
+            Source::Simulated(simulation) => Ok(self.simulate(simulation)),
+            Source::Arm(arm) => {
+                let logs = arm.record(model, &self.effects, &mut self.rng());
+                let logs = logs.map_err(|message| anyhow!("{}: {message}", self.id))?;
+                Ok((logs, Truth::of(&self.effects, BTreeMap::new(), &[])))
+            }
+            Source::Drawn(_) => Err(anyhow!("{}: its rig has not been drawn", self.id)),
+        }
+    }
+
+    fn simulate(&self, simulation: &Simulation) -> (Vec<Log>, Truth) {
+        let (driving, condition) = (&simulation.driving, &simulation.condition);
+        let machine = Machine::with(simulation.mechanics.clone(), &self.effects)
+            .expect("the effects were checked when the grid was read");
+        let mut rng = self.rng();
+        let offsets: Vec<Pair> = (0..condition.logs)
+            .map(|_| self.draw_offset(&mut rng))
+            .collect();
+        let truth = Truth::of(&self.effects, machine.declared(), &offsets);
+        let record = |(index, offset): (usize, &Pair)| {
+            machine.record(driving, condition, index, *offset, &mut rng)
+        };
+        (offsets.iter().enumerate().map(record).collect(), truth)
+    }
+
+    /// Cells share neither their motions nor their noise.
+    fn rng(&self) -> ChaCha8Rng {
+        ChaCha8Rng::seed_from_u64(content_hash(self.id.as_bytes()))
+    }
+
+    fn draw_offset(&self, rng: &mut ChaCha8Rng) -> Pair {
+        let mut offset = [0.0; 2];
+        for effect in &self.effects {
+            if effect.name == "sensor_offset" {
+                offset[effect.joint] = effect.values["q_z"] * rng.random_range(-1.0..=1.0);
+            }
+        }
+        offset
+    }
+
+    /// Record the logs, close the loop or fit the structure that is told, judge.
+    ///
+    /// # Errors
+    /// A model file or log that cannot be read, or logs on which closing the loop fails.
+    pub fn run(&self, library: &Library) -> anyhow::Result<Findings> {
+        let model = self.declared(library)?;
+        let (logs, mut truth) = self.record(&model)?;
+        let split = last_is_test(logs);
+        let settings = Settings::default();
+        let (effects, known) = (&self.effects, &truth.declared);
+        // What an arm is told is compared by torques, which this fit knows nothing of.
+        let told = match self.source {
+            Source::Arm(_) => None,
+            _ => Told::fit(&model, library, &split, &settings, effects, known),
+        };
+        if self.group == Group::Told {
+            let told = told.context("the true structure cannot be fitted")?;
+            return Ok(Findings::Told(KnownStructure {
+                error: told.error(),
+                coverage: told.coverage(&truth)?,
+                truth,
+            }));
+        }
+        if self.group == Group::Several {
+            truth.twins = told.as_ref().map(Told::twins).unwrap_or_default();
+        }
+        let outcome = close(&model, library, split.clone(), self.seed)?;
+        let answer = answer(&outcome);
+        Ok(Findings::Searched(Box::new(Searched {
+            judgement: judge(self.group, &truth, &answer),
+            errors: Errors {
+                before: outcome.errors.before.position_rms(),
+                after: outcome.errors.after.position_rms(),
+                told: told.map(|told| told.error()),
+            },
+            truth,
+            answer,
+        })))
+    }
+}
+
+/// What is tested.
+fn close(model: &Model, library: &Library, split: Split, seed: u64) -> Result<Outcome, StudyError> {
+    let request = Request::new(model, library, split);
+    close_loop(request, &mut ChaCha8Rng::seed_from_u64(seed), &())
+}

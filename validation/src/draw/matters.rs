@@ -1,0 +1,93 @@
+//! Draw until every effect matters.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Result, anyhow};
+use rand::Rng;
+
+use super::recipe::{Drawn, Recipe};
+use crate::cell::last_is_test;
+use crate::grid::Cell;
+use crate::hidden::Hidden;
+use crate::told::{Told, at_truth};
+use residyn_core::closeloop::{Settings, Split};
+use residyn_core::model::{Library, Model};
+
+/// Draws of single effects before the whole rig is drawn anew, and whole rigs before giving up.
+const EFFECTS: usize = 16;
+const RIGS: usize = 16;
+
+impl Recipe {
+    /// A rig for `cell` each of whose effects matters: one that does not is drawn again.
+    ///
+    /// # Errors
+    /// As [`Recipe::draw`], or rules by which no effect matters.
+    pub fn settle(
+        &self,
+        cell: &Cell,
+        model: &Model,
+        library: &Library,
+        rng: &mut impl Rng,
+    ) -> Result<Drawn> {
+        for _ in 0..RIGS {
+            let mut drawn = self.draw(rng)?;
+            for _ in 0..EFFECTS {
+                let Some(place) = self.idle(cell, &drawn, model, library)? else {
+                    return Ok(drawn);
+                };
+                self.draw_effect(&mut drawn, place, rng)?;
+            }
+        }
+        Err(anyhow!(
+            "of {} draws none had effects that all matter",
+            RIGS * EFFECTS
+        ))
+    }
+
+    /// The place of an effect that does not matter, if there is one.
+    fn idle(
+        &self,
+        cell: &Cell,
+        drawn: &Drawn,
+        model: &Model,
+        library: &Library,
+    ) -> Result<Option<usize>> {
+        if drawn.effects.is_empty() {
+            return Ok(None);
+        }
+        let settings = Settings::default();
+        let (inside, outside) = drawn.effects.split_at(self.effects);
+        let (split, declared) = record(cell, drawn, inside, model)?;
+        let known = at_truth(model, &declared);
+        let Some(told) = Told::fit(&known, library, &split, &settings, inside, &declared) else {
+            return Ok(Some(0));
+        };
+        let matters = |rise: f64| rise >= self.rules.matters;
+        if let Some(place) = (0..inside.len()).find(|k| !matters(told.rises_without(*k))) {
+            return Ok(Some(place));
+        }
+        for k in 0..outside.len() {
+            // Beside the best that the library has in its place, and against the same rig without it.
+            let present = [inside, &outside[..=k]].concat();
+            let (split, declared) = record(cell, drawn, &present, model)?;
+            let nearest = [inside, &drawn.stand_ins[k]].concat();
+            let known = at_truth(model, &declared);
+            let best = Told::fit(&known, library, &split, &settings, &nearest, &declared);
+            if best.is_some_and(|best| !matters(best.error() / told.error())) {
+                return Ok(Some(inside.len() + k));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// The logs of a drawn rig with these effects alone, and the true values of its declared parameters.
+fn record(
+    cell: &Cell,
+    drawn: &Drawn,
+    effects: &[Hidden],
+    model: &Model,
+) -> Result<(Split, BTreeMap<String, f64>)> {
+    let (logs, truth) = cell.drawn(drawn, effects).record(model)?;
+    Ok((last_is_test(logs), truth.declared))
+}

@@ -1,0 +1,86 @@
+//! What may be drawn.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::size::Size;
+use crate::condition::Loop;
+use residyn_core::data::Joint;
+
+/// By which rigs are drawn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rules {
+    pub condition: ConditionRules,
+    /// Free parameters of the model file start at the true value, times or divided by up to this factor.
+    pub start: Size,
+    /// An effect matters without which the best fit of what is left has at least this many times the error.
+    pub matters: f64,
+    /// Effects of the library, by name.
+    pub effects: BTreeMap<String, Kind>,
+    /// Effects that the library lacks, by name.
+    pub outside: BTreeMap<String, Kind>,
+    /// A joint has at most one effect of each of these sets.
+    pub exclusive: Vec<Vec<String>>,
+}
+
+/// How logs are taken.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConditionRules {
+    /// The logs of a rig take turns in two of these.
+    pub loops: Vec<Loop>,
+    pub rate_hz: Size,
+    pub logs: Size,
+    pub seconds: Size,
+    /// Steps of the encoder are a turn divided by two to the power of this.
+    pub bits: Size,
+    /// Standard deviation of white noise on positions, in steps of the encoder.
+    pub noise: Size,
+    pub jitter: Size,
+    pub dropped: Size,
+    pub burst: Size,
+    /// Standard deviation of the logged torque, and its step, in parts of the largest torque of the joint.
+    pub torque_noise: Size,
+    pub torque_quantum: Size,
+    /// One of these \[s\]; zero for velocities that are differences.
+    pub filter_s: Vec<f64>,
+}
+
+/// An effect that may be drawn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Kind {
+    /// How often, beside others.
+    #[serde(default = "one")]
+    pub weight: f64,
+    /// On this joint alone.
+    #[serde(default)]
+    pub joint: Option<Joint>,
+    pub values: BTreeMap<String, Size>,
+    /// Of an effect that the library lacks, what of the library comes nearest to it: it has to matter beside them.
+    #[serde(default)]
+    pub stand_ins: Vec<StandIn>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// An effect of the library that is fitted in place of another, from these values.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StandIn {
+    pub name: String,
+    pub values: BTreeMap<String, Size>,
+}
+
+impl Rules {
+    /// Whether a joint can have both of these effects.
+    pub fn allow(&self, one: &str, other: &str) -> bool {
+        let has = |set: &&Vec<String>, name: &str| set.iter().any(|of| of == name);
+        let together = |set: &&Vec<String>| has(set, one) && has(set, other);
+        one != other && !self.exclusive.iter().any(|set| together(&set))
+    }
+}

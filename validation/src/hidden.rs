@@ -1,0 +1,340 @@
+//! Hidden effects by name, as written in a grid, and what they change in a rig.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::force::Force;
+use super::friction::{DryFriction, Presliding};
+use super::machine::Machine;
+use super::mechanics::Mechanics;
+use super::transmission::Transmission;
+use residyn_core::data::Joint;
+
+/// `coulomb_friction@1`; of a shift `parameter_shift(m1)`.
+pub type Label = String;
+
+pub fn label(name: &str, joint: Joint, parameter: &str) -> Label {
+    match name {
+        "parameter_shift" => format!("{name}({parameter})"),
+        _ => format!("{name}@{joint}"),
+    }
+}
+
+/// One effect that a rig has and its model does not declare.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Hidden {
+    pub name: String,
+    pub joint: Joint,
+    /// Its numbers, in N m, rad and s; of a shift, the parameter's true value; of a sensor's offset, the
+    /// spread `q_z` over the logs.
+    #[serde(flatten)]
+    pub values: BTreeMap<String, f64>,
+}
+
+impl Hidden {
+    pub fn label(&self) -> Label {
+        let parameters: Vec<&str> = self.values.keys().map(String::as_str).collect();
+        label(&self.name, self.joint, &parameters.join(", "))
+    }
+}
+
+/// The numbers of an effect that have not been used yet.
+struct Numbers<'h> {
+    of: &'h Hidden,
+    left: BTreeMap<String, f64>,
+}
+
+impl Numbers<'_> {
+    fn take(&mut self, name: &str) -> Result<f64, String> {
+        let missing = || format!("`{}` needs `{name}`", self.of.name);
+        self.left.remove(name).ok_or_else(missing)
+    }
+
+    /// The smooth torque of the effect, if it has one.
+    fn force(&mut self) -> Result<Option<Force>, String> {
+        let of = self.of;
+        let mut n = |name: &str| self.take(name);
+        Ok(Some(match of.name.as_str() {
+            "viscous_friction" => Force::Viscous { b: n("b")? },
+            "asymmetric_friction" => Force::TwoSlopes {
+                b_p: n("b_p")?,
+                b_n: n("b_n")?,
+            },
+            "degressive_friction" => Force::Degressive {
+                rise: n("F_d")?,
+                bend: n("v_d")?,
+            },
+            "quadratic_drag" => Force::QuadraticDrag { c: n("c")? },
+            "cubic_damping" => Force::CubicDamping { c: n("c")? },
+            "joint_spring" => Force::Spring {
+                k: n("k")?,
+                q_0: n("q_0")?,
+            },
+            "constant_torque" => Force::Constant { tau_0: n("tau_0")? },
+            "cogging_torque" | "fractional_ripple" => Force::Ripple {
+                amplitude: n("A")?,
+                periods: n("N")?,
+                phase: n("phase")?,
+            },
+            "periodic_disturbance" => Force::Hum {
+                amplitude: n("A")?,
+                frequency_hz: n("f")?,
+                phase: n("phase")?,
+            },
+            _ => return Ok(None),
+        }))
+    }
+
+    /// The dry friction of the effect, if it has any.
+    fn dry_friction(&mut self) -> Result<Option<DryFriction>, String> {
+        let of = self.of;
+        let mut n = |name: &str| self.take(name);
+        Ok(Some(match of.name.as_str() {
+            "coulomb_friction" => DryFriction::Coulomb { level: n("F_c")? },
+            "stribeck_friction" => DryFriction::Stribeck {
+                f_c: n("F_c")?,
+                f_s: n("F_s")?,
+                v_s: n("v_s")?,
+            },
+            "asymmetric_friction" => DryFriction::Asymmetric {
+                forward: n("F_p")?,
+                backward: n("F_n")?,
+            },
+            "load_friction" => DryFriction::Load { share: n("k")? },
+            "uneven_friction" => DryFriction::Uneven {
+                level: n("F")?,
+                share: n("a")?,
+            },
+            _ => return Ok(None),
+        }))
+    }
+
+    fn none_left(&self) -> Result<(), String> {
+        match self.left.keys().next() {
+            Some(name) => Err(format!("`{}` has no `{name}`", self.of.name)),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Machine {
+    /// A rig with these effects.
+    ///
+    /// # Errors
+    /// An unknown effect, a joint that the rig does not have, or missing or surplus numbers.
+    pub(crate) fn with(mechanics: Mechanics, effects: &[Hidden]) -> Result<Self, String> {
+        let mut machine = Self::bare(mechanics);
+        for effect in effects {
+            machine.add(effect)?;
+        }
+        Ok(machine)
+    }
+
+    fn add(&mut self, hidden: &Hidden) -> Result<(), String> {
+        let joints = self.joints();
+        if !hidden.joint.is_of(joints) {
+            let name = &hidden.name;
+            return Err(format!("`{name}`: `joint` is from 1 to {joints}"));
+        }
+        if hidden.name == "parameter_shift" {
+            return self.shift(hidden);
+        }
+        let j = hidden.joint.index();
+        let mut numbers = Numbers {
+            of: hidden,
+            left: hidden.values.clone(),
+        };
+        let (force, friction) = (numbers.force()?, numbers.dry_friction()?);
+        if force.is_none() && friction.is_none() {
+            self.change(hidden, &mut numbers)?;
+        }
+        self.forces.extend(force.map(|force| (j, force)));
+        self.dry.extend(friction.map(|friction| (j, friction)));
+        numbers.none_left()
+    }
+
+    /// Add an effect that is neither a smooth torque nor dry friction.
+    fn change(&mut self, hidden: &Hidden, numbers: &mut Numbers<'_>) -> Result<(), String> {
+        let j = hidden.joint.index();
+        let mut n = |name: &str| numbers.take(name);
+        let drive = &mut self.drives[j];
+        match hidden.name.as_str() {
+            "presliding" => {
+                let (level, stiffness) = (n("F_c")?, n("sigma")?);
+                self.presliding.push((j, Presliding { level, stiffness }));
+            }
+            "gravity_tilt" if j == 0 => self.tilt += n("delta")?,
+            "rotor_inertia" => self.rotor[j] += n("J")?,
+            "actuator_gain" => drive.shape.gain = n("g")?,
+            "actuator_deadzone" => drive.shape.deadzone = n("w")?,
+            "actuator_saturation" => drive.shape.limit = n("m")?,
+            "back_emf_limit" => (drive.shape.limit, drive.shape.back_emf) = (n("m")?, n("k")?),
+            "actuator_delay" => drive.delay = n("d")?,
+            "actuator_lag" => drive.lag = n("T")?,
+            "backlash" => self.transmissions[j] = Some(Transmission::backlash(n("delta")?)),
+            "joint_compliance" => {
+                let (stiffness, inertia) = (n("k")?, n("J")?);
+                self.transmissions[j] = Some(Transmission::compliance(stiffness, inertia));
+            }
+            "encoder_eccentricity" => self.eccentricity[j] = [n("e_s")?, n("e_c")?],
+            // Of the sensor, not of the machine: each log draws its own.
+            "sensor_offset" => drop(n("q_z")?),
+            name => return Err(format!("`{name}` is no effect of joint {}", hidden.joint)),
+        }
+        Ok(())
+    }
+
+    fn shift(&mut self, hidden: &Hidden) -> Result<(), String> {
+        for (name, value) in &hidden.values {
+            let unknown = || format!("`parameter_shift`: the rig has no `{name}`");
+            self.mechanics.set(name, *value).ok_or_else(unknown)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use super::Hidden;
+    use crate::drive::Approach;
+    use crate::machine::{Machine, State};
+    use crate::mechanics::tests::double_pendulum;
+    use residyn_core::data::Joint;
+
+    fn hidden(name: &str, values: &[(&str, f64)]) -> Hidden {
+        Hidden {
+            name: name.to_owned(),
+            joint: Joint::at(0),
+            values: values
+                .iter()
+                .map(|(name, value)| ((*name).to_owned(), *value))
+                .collect(),
+        }
+    }
+
+    /// Acceleration of the first joint at a state, under a torque, with this effect less that without.
+    fn adds(effect: &Hidden) -> f64 {
+        let state = State {
+            q: [0.4, 0.3],
+            v: [1.5, -0.5],
+            motor_q: [0.41, 0.3],
+            motor_v: [1.5, -0.5],
+            bristle: [0.01, 0.0],
+        };
+        let command = Approach {
+            target: 2.0,
+            since: -1.0,
+            ..Approach::default()
+        };
+        let acceleration = |effects: &[Hidden]| {
+            let machine = Machine::with(double_pendulum(), effects).unwrap();
+            let commands = [command; 2];
+            let directions = machine.directions(0.2, &state, &commands);
+            machine.slope(0.2, &state, &commands, directions).v[0]
+        };
+        acceleration(std::slice::from_ref(effect)) - acceleration(&[])
+    }
+
+    #[test]
+    fn every_effect_changes_the_acceleration_in_its_direction() {
+        let against = [
+            hidden("viscous_friction", &[("b", 0.1)]),
+            hidden("coulomb_friction", &[("F_c", 0.1)]),
+            hidden(
+                "stribeck_friction",
+                &[("F_c", 0.1), ("F_s", 0.2), ("v_s", 1.0)],
+            ),
+            hidden(
+                "asymmetric_friction",
+                &[("F_p", 0.1), ("F_n", 0.2), ("b_p", 0.0), ("b_n", 0.0)],
+            ),
+            hidden("degressive_friction", &[("F_d", 0.1), ("v_d", 0.2)]),
+            hidden("quadratic_drag", &[("c", 0.1)]),
+            hidden("load_friction", &[("k", 0.1)]),
+            hidden("joint_spring", &[("k", 0.1), ("q_0", 0.0)]),
+            hidden("gravity_tilt", &[("delta", 0.1)]),
+            hidden("actuator_deadzone", &[("w", 0.1)]),
+            hidden("actuator_saturation", &[("m", 1.5)]),
+            hidden("cubic_damping", &[("c", 0.1)]),
+            hidden("uneven_friction", &[("F", 0.1), ("a", 0.5)]),
+            hidden("presliding", &[("F_c", 0.2), ("sigma", 10.0)]),
+            hidden("back_emf_limit", &[("m", 2.0), ("k", 0.1)]),
+        ];
+        for effect in &against {
+            assert!(adds(effect) < -1e-3, "{effect:?}: {}", adds(effect));
+        }
+        let along = [
+            hidden("joint_spring", &[("k", 0.1), ("q_0", 1.0)]),
+            hidden("constant_torque", &[("tau_0", 0.1)]),
+            hidden("cogging_torque", &[("A", 0.1), ("N", 3.0), ("phase", 0.0)]),
+            hidden(
+                "fractional_ripple",
+                &[("A", 0.1), ("N", 2.5), ("phase", 0.0)],
+            ),
+            hidden("actuator_gain", &[("g", 0.1)]),
+            hidden(
+                "periodic_disturbance",
+                &[("A", 0.1), ("f", 1.0), ("phase", 0.0)],
+            ),
+        ];
+        for effect in &along {
+            assert!(adds(effect) > 1e-3, "{effect:?}: {}", adds(effect));
+        }
+    }
+
+    #[test]
+    fn rotor_inertia_acts_on_its_own_joint_alone() {
+        let rotor = Machine::with(double_pendulum(), &[hidden("rotor_inertia", &[("J", 0.1)])]);
+        let heavy = rotor.unwrap();
+        let bare = Machine::bare(double_pendulum());
+        let state = State::at_rest([0.4, 0.3]);
+        let commands = [Approach::default(); 2];
+        let slopes = [&bare, &heavy].map(|m| m.slope(0.0, &state, &commands, [0.0; 2]).v);
+        let mass = bare.mechanics.mass(state.q);
+        // M a = (M + diag(J, 0)) a' in both rows.
+        let torque = |a: [f64; 2], row: usize| mass[row][0] * a[0] + mass[row][1] * a[1];
+        let first = torque(slopes[1], 0) + 0.1 * slopes[1][0];
+        assert!((torque(slopes[0], 0) - first).abs() < 1e-12);
+        assert!((torque(slopes[0], 1) - torque(slopes[1], 1)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_shift_of_an_unknown_parameter_is_refused() {
+        let shifted = Machine::with(
+            double_pendulum(),
+            &[hidden("parameter_shift", &[("m2", 1.0)])],
+        );
+        assert_ne!(shifted.unwrap().mechanics, double_pendulum());
+        let wrong = Machine::with(
+            double_pendulum(),
+            &[hidden("parameter_shift", &[("m3", 1.0)])],
+        );
+        assert_eq!(wrong.unwrap_err(), "`parameter_shift`: the rig has no `m3`");
+    }
+
+    #[test]
+    fn a_compliant_joint_carries_its_encoder_on_the_motor() {
+        for effect in [
+            hidden("backlash", &[("delta", 0.01)]),
+            hidden("joint_compliance", &[("k", 30.0), ("J", 0.01)]),
+        ] {
+            let machine = Machine::with(double_pendulum(), &[effect]).unwrap();
+            let mut state = State::at_rest([0.4, 0.3]);
+            state.motor_q = [0.5, 0.6];
+            assert_eq!(machine.encoders(&state), [0.5, 0.3]);
+        }
+    }
+
+    #[test]
+    fn a_disc_off_its_axis_reads_ahead_and_behind() {
+        let disc = hidden("encoder_eccentricity", &[("e_s", 0.02), ("e_c", -0.01)]);
+        let machine = Machine::with(double_pendulum(), &[disc]).unwrap();
+        let read = |q: f64| machine.encoders(&State::at_rest([q, 0.3]));
+        assert_eq!(read(0.0), [-0.01, 0.3]);
+        assert!((read(FRAC_PI_2)[0] - FRAC_PI_2 - 0.02).abs() < 1e-15);
+        assert!((read(PI)[0] - PI - 0.01).abs() < 1e-15);
+    }
+}

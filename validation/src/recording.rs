@@ -1,0 +1,320 @@
+//! Recording a log: drive the rig, read its sensors.
+
+use std::path::PathBuf;
+
+use rand::{Rng, RngExt};
+
+use super::condition::{Condition, Driving, Loop};
+use super::excitation::{Chirp, Controller, Multisine, Steps};
+use super::machine::{Machine, State};
+use super::mechanics::Pair;
+use super::motion::STEP_S;
+use super::sensors::{Clock, Losses, Speed, sensed};
+use super::wires::Wires;
+use residyn_core::data::Log;
+
+/// Logs differ in how hard the rig is driven; the last of them lies within the range of the others where there
+/// are more than two.
+const STRENGTHS: [f64; 6] = [1.2, 0.5, 0.8, 1.0, 0.7, 0.9];
+
+/// Where the torque comes from.
+enum Source {
+    Multisine(Multisine),
+    Chirp(Chirp),
+    Steps(Steps),
+    Closed(Multisine, Controller),
+}
+
+impl Source {
+    fn draw(driving: &Driving, how: Loop, effort: &Effort, j: usize, rng: &mut impl Rng) -> Self {
+        let (size, band) = (effort.strength * driving.torque[j], driving.torque_hz);
+        match how {
+            Loop::Open => Self::Multisine(Multisine::draw(size, band, rng)),
+            Loop::Release => Self::Multisine(Multisine::draw(0.5 * size, band, rng)),
+            Loop::Chirp => Self::Chirp(Chirp::draw(size, band, effort.seconds, rng)),
+            Loop::Steps => Self::Steps(Steps::draw(size, band, effort.seconds, rng)),
+            Loop::Closed => {
+                let size = effort.strength * driving.reference[j];
+                let reference = Multisine::draw(size, driving.reference_hz, rng);
+                let controller =
+                    Controller::new(driving.stiffness[j], driving.damping[j], driving.limit[j]);
+                Self::Closed(reference, controller)
+            }
+        }
+    }
+
+    fn command(&mut self, measured: f64, time: f64, dt: f64) -> f64 {
+        match self {
+            Self::Multisine(torque) => torque.at(time),
+            Self::Chirp(torque) => torque.at(time),
+            Self::Steps(torque) => torque.at(time),
+            Self::Closed(reference, controller) => {
+                let wanted = [reference.at(time), reference.rate(time)];
+                controller.command(measured, wanted, dt)
+            }
+        }
+    }
+}
+
+/// How hard and how long \[s\] a rig is driven.
+struct Effort {
+    strength: f64,
+    seconds: f64,
+}
+
+/// The state from which a log begins: at rest, hanging down, or where the rig is let go.
+fn start(driving: &Driving, how: Loop, strength: f64, rng: &mut impl Rng) -> State {
+    let mut q = [0.0; 2];
+    if how == Loop::Release {
+        for (angle, reference) in q.iter_mut().zip(&driving.reference) {
+            let side = if rng.random() { 1.0 } else { -1.0 };
+            *angle = side * strength * rng.random_range(1.0..=2.0) * reference;
+        }
+    }
+    State::at_rest(q)
+}
+
+impl Machine {
+    /// Record the `index`-th log of a rig that starts at rest; encoders read too much by `offset` rad. Velocities
+    /// are filtered backward differences of what the encoders read. Rows that are lost are not in the log, while the
+    /// rig and its controller go on.
+    pub fn record(
+        &self,
+        driving: &Driving,
+        condition: &Condition,
+        index: usize,
+        offset: Pair,
+        rng: &mut impl Rng,
+    ) -> Log {
+        let (joints, flaws) = (self.joints(), &condition.flaws);
+        let how = condition.drive[index % condition.drive.len()];
+        let effort = Effort {
+            strength: STRENGTHS[index % STRENGTHS.len()],
+            seconds: condition.seconds,
+        };
+        let mut sources: Vec<Source> = (0..joints)
+            .map(|j| Source::draw(driving, how, &effort, j, rng))
+            .collect();
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some thousands
+        let rows = (condition.seconds * condition.rate_hz).round() as usize + 1;
+        let mut clock = Clock::new(condition.rate_hz, flaws);
+        let mut losses = Losses::new(flaws);
+        let mut speeds = vec![Speed::default(); joints];
+        let mut wires = Wires::default();
+        let mut state = start(driving, how, effort.strength, rng);
+        let mut log = empty(index, joints);
+        let (mut time, mut dt) = (0.0, 1.0 / condition.rate_hz);
+        for row in 0..rows {
+            // The first and the last row are there, so that the log is as long as it was meant to be.
+            let kept = !losses.next(rng) || row == 0 || row == rows - 1;
+            let encoders = self.encoders(&state);
+            let mut command = [0.0; 2];
+            for j in 0..joints {
+                let angle = encoders[j] + offset[j];
+                let q = sensed(angle, condition.noise, condition.quantum, rng);
+                let qd = speeds[j].at(q, dt, flaws.filter_s);
+                command[j] = sources[j].command(q, time, dt);
+                if kept {
+                    log.q[j].push(q);
+                    log.qd[j].push(qd);
+                    log.tau[j].push(flaws.torque(command[j], driving.limit[j], rng));
+                }
+            }
+            if kept {
+                log.time.push(time);
+            }
+            wires.issue(time, command);
+            let next = clock.next(rng);
+            self.hold(&mut state, &mut wires, time, next);
+            (dt, time) = (next - time, next);
+        }
+        log
+    }
+
+    /// Integrates from one reading to the next \[s\], split where a command arrives at a drive.
+    fn hold(&self, state: &mut State, wires: &mut Wires, from: f64, to: f64) {
+        for span in wires.cuts(self, from, to).windows(2) {
+            let given = wires.given(self, span[0]);
+            self.advance(state, span[0], span[1] - span[0], &given, STEP_S);
+        }
+    }
+}
+
+/// The name of the `index`-th log, counted from 0.
+pub fn log_name(index: usize) -> String {
+    format!("log{}.csv", index + 1)
+}
+
+fn empty(index: usize, joints: usize) -> Log {
+    Log {
+        path: PathBuf::from(log_name(index)),
+        ..Log::empty(joints)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use crate::condition::{Condition, Driving, Loop};
+    use crate::force::Force;
+    use crate::friction::DryFriction;
+    use crate::machine::Machine;
+    use crate::mechanics::tests::pendulum;
+    use crate::sensors::Flaws;
+    use residyn_core::data::Log;
+
+    fn driving() -> Driving {
+        Driving {
+            torque: vec![0.6],
+            torque_hz: [0.2, 2.0],
+            reference: vec![0.6],
+            reference_hz: [0.2, 1.0],
+            stiffness: vec![10.0],
+            damping: vec![1.2],
+            limit: vec![4.0],
+        }
+    }
+
+    fn condition(how: Loop) -> Condition {
+        Condition {
+            drive: vec![how],
+            rate_hz: 100.0,
+            noise: 0.0,
+            quantum: 0.0,
+            logs: 3,
+            seconds: 4.0,
+            flaws: Flaws::default(),
+        }
+    }
+
+    fn record(machine: &Machine, condition: &Condition, offset: f64) -> Log {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        machine.record(&driving(), condition, 0, [offset, 0.0], &mut rng)
+    }
+
+    fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+        let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        differences.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_delay_of_whole_steps_shifts_the_motion_exactly() {
+        let sound = Machine::bare(pendulum());
+        let mut late = sound.clone();
+        late.drives[0].delay = 0.03;
+        let open = condition(Loop::Open);
+        let (early, late) = (record(&sound, &open, 0.0), record(&late, &open, 0.0));
+        assert_eq!(early.tau, late.tau);
+        // The same torque on the same rig, three rows later, from the same rest.
+        let rows = early.rows() - 3;
+        assert!(largest_difference(&early.q[0][..rows], &late.q[0][3..]) < 1e-12);
+    }
+
+    #[test]
+    fn a_delay_of_part_of_a_step_splits_the_step_between_two_torques() {
+        let mut machine = Machine::bare(crate::mechanics::Mechanics::Pendulum {
+            inertia: 1.0,
+            moment: 0.0,
+            g: 9.81,
+        });
+        machine.drives[0].delay = 0.0137;
+        let mut condition = condition(Loop::Open);
+        condition.seconds = 1.0;
+        let log = record(&machine, &condition, 0.0);
+        // Speed is the sum of torque by time: of step k, 3.7 ms of command k - 2 and 6.3 ms of k - 1.
+        let command = |k: usize, back: usize| k.checked_sub(back).map_or(0.0, |k| log.tau[0][k]);
+        let (mut q, mut v) = (0.0, 0.0);
+        for row in 0..log.rows() {
+            assert!((log.q[0][row] - q).abs() < 1e-12, "row {row}");
+            for (torque, h) in [(command(row, 2), 0.0037), (command(row, 1), 0.0063)] {
+                q += v * h + 0.5 * torque * h * h;
+                v += torque * h;
+            }
+        }
+    }
+
+    #[test]
+    fn a_lag_follows_its_own_equation() {
+        let mut machine = Machine::bare(crate::mechanics::Mechanics::Pendulum {
+            inertia: 1.0,
+            moment: 0.0,
+            g: 9.81,
+        });
+        machine.drives[0].lag = 0.05;
+        let log = record(&machine, &condition(Loop::Open), 0.0);
+        // Forward steps of 10 us of T tau' + tau = u.
+        let (mut q, mut v, mut tau) = (0.0, 0.0, 0.0);
+        for row in 0..log.rows() {
+            assert!((log.q[0][row] - q).abs() < 1e-4, "row {row}");
+            for _ in 0..1000 {
+                tau += 1e-5 / 0.05 * (log.tau[0][row] - tau);
+                v += 1e-5 * tau;
+                q += 1e-5 * v;
+            }
+        }
+    }
+
+    #[test]
+    fn a_sensor_offset_does_not_change_open_loop_motion() {
+        let machine = Machine::bare(pendulum());
+        let open = condition(Loop::Open);
+        let (plain, off) = (record(&machine, &open, 0.0), record(&machine, &open, 0.05));
+        let shifted: Vec<f64> = plain.q[0].iter().map(|q| q + 0.05).collect();
+        assert!(largest_difference(&shifted, &off.q[0]) < 1e-15);
+        assert_eq!(plain.tau, off.tau);
+    }
+
+    #[test]
+    fn closed_loop_torque_depends_on_the_rig_and_respects_its_limit() {
+        let closed = condition(Loop::Closed);
+        let plain = record(&Machine::bare(pendulum()), &closed, 0.0);
+        let mut rough = Machine::bare(pendulum());
+        rough.dry.push((0, DryFriction::Coulomb { level: 0.3 }));
+        let rough = record(&rough, &closed, 0.0);
+        assert!(largest_difference(&plain.tau[0], &rough.tau[0]) > 0.1);
+        assert!(plain.tau[0].iter().all(|tau| tau.abs() <= 4.0));
+        assert!(plain.q[0].iter().any(|q| q.abs() > 0.3));
+    }
+
+    #[test]
+    fn encoders_have_the_configured_noise_and_step_and_velocities_are_differences() {
+        let mut machine = Machine::bare(pendulum());
+        machine.forces.push((0, Force::Viscous { b: 0.1 }));
+        let clean = record(&machine, &condition(Loop::Open), 0.0);
+        let mut noisy = condition(Loop::Open);
+        (noisy.noise, noisy.quantum) = (1e-3, 0.0);
+        let noisy = record(&machine, &noisy, 0.0);
+        let pairs = clean.q[0].iter().zip(&noisy.q[0]);
+        let mean_square = pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 401.0;
+        assert!((mean_square.sqrt() - 1e-3).abs() < 1e-4, "{mean_square}");
+        let mut coarse = condition(Loop::Open);
+        coarse.quantum = 0.01;
+        let coarse = record(&machine, &coarse, 0.0);
+        let whole = |q: &f64| (q / 0.01 - (q / 0.01).round()).abs() < 1e-9;
+        assert!(coarse.q[0].iter().all(whole));
+        for row in 1..noisy.rows() {
+            let difference = (noisy.q[0][row] - noisy.q[0][row - 1]) / 0.01;
+            assert!((noisy.qd[0][row] - difference).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn lost_rows_are_missing_while_the_rig_goes_on() {
+        let machine = Machine::bare(pendulum());
+        let mut closed = condition(Loop::Closed);
+        let whole = record(&machine, &closed, 0.0);
+        (closed.flaws.dropped, closed.flaws.burst) = (0.1, 4);
+        let lossy = record(&machine, &closed, 0.0);
+        let lost = whole.rows() - lossy.rows();
+        assert!((20..70).contains(&lost), "{lost}");
+        assert_eq!(lossy.duration(), whole.duration());
+        // What is left is what was there: the controller has seen the lost rows, and the rig has moved under it.
+        for (row, time) in lossy.time.iter().enumerate() {
+            let there = whole.time.iter().position(|t| t == time).unwrap();
+            let of = |log: &Log, row: usize| [log.q[0][row], log.qd[0][row], log.tau[0][row]];
+            assert_eq!(of(&lossy, row), of(&whole, there));
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Open-loop position errors, log by log, which pool over folds.
+
+use serde::{Deserialize, Serialize};
+
+use residyn_core::closeloop::Settings;
+use residyn_core::data::{Log, statistics::median};
+use residyn_core::model::Dynamics;
+use residyn_core::sim::metric::{Assessment, OpenLoop, assess};
+
+/// The errors of a model on a test log, one a horizon of [`ScoreSettings`](residyn_core::closeloop::ScoreSettings).
+pub type LogErrors = Vec<Squares>;
+
+/// Squared position errors of the windows of one log at one horizon.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Squares {
+    /// Sum over rows and joints \[rad^2\].
+    pub sum: f64,
+    /// Rows times joints.
+    pub count: usize,
+    /// Root mean square of each window over its rows and all joints \[rad\].
+    pub windows: Vec<f64>,
+    /// Number of windows in which the model diverged.
+    pub diverged: usize,
+}
+
+/// The errors of a model on each of several logs.
+pub fn errors_on(model: &Dynamics, logs: &[Log]) -> Vec<LogErrors> {
+    let horizons_s = Settings::default().score.horizons_s;
+    by_log(&assess(model, logs, &horizons_s), logs.len())
+}
+
+/// An assessment on so many logs, taken apart by log.
+pub fn by_log(assessment: &Assessment, logs: usize) -> Vec<LogErrors> {
+    let horizons = &assessment.horizons;
+    (0..logs)
+        .map(|log| {
+            horizons
+                .iter()
+                .map(|horizon| Squares::of(horizon, log))
+                .collect()
+        })
+        .collect()
+}
+
+impl Squares {
+    fn of(horizon: &OpenLoop, log: usize) -> Self {
+        let windows = horizon.windows.iter().filter(|window| window.log == log);
+        let windows = windows.map(|window| {
+            let count = window.rows * window.position.len();
+            Self::of_window(window.position.iter().sum(), count, window.diverged)
+        });
+        Self::pooled(&windows.collect::<Vec<_>>())
+    }
+
+    /// One window: the sum over its rows and joints, and their number.
+    pub(super) fn of_window(sum: f64, count: usize, diverged: bool) -> Self {
+        let window = Self {
+            sum,
+            count,
+            windows: Vec::new(),
+            diverged: usize::from(diverged),
+        };
+        Self {
+            windows: vec![window.rms()],
+            ..window
+        }
+    }
+
+    /// All windows of several.
+    pub fn pooled<'s>(all: impl IntoIterator<Item = &'s Self>) -> Self {
+        all.into_iter()
+            .fold(Self::default(), |mut pooled, squares| {
+                pooled.sum += squares.sum;
+                pooled.count += squares.count;
+                pooled.windows.extend(&squares.windows);
+                pooled.diverged += squares.diverged;
+                pooled
+            })
+    }
+
+    /// Root mean square over all rows of all windows and all joints \[rad\]; NaN without a window.
+    #[allow(clippy::cast_precision_loss)] // rows are far fewer than 2^52
+    pub fn rms(&self) -> f64 {
+        (self.sum / self.count as f64).sqrt()
+    }
+
+    /// Median over the windows of a window's own root mean square \[rad\].
+    pub fn median(&self) -> f64 {
+        median(&self.windows)
+    }
+}
