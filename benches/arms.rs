@@ -1,8 +1,8 @@
 //! Inverse and forward dynamics of chains of bodies: one state at a time, and states side by side in vector lanes, on one core.
-//! `benches/arms` sets the arm of seven joints beside Pinocchio and MuJoCo.
+//! `benches/arms` compares the arm of seven joints with Pinocchio and MuJoCo.
 //!
-//! Prints one JSON object a measurement: what was computed, for how many joints, in how many lanes of which numbers, and the
-//! nanoseconds of one state.
+//! Prints one JSON object per measurement: what was computed, for how many joints, in how many lanes of which number
+//! type, and the nanoseconds per state.
 
 use std::path::Path;
 use std::time::Instant;
@@ -14,12 +14,12 @@ use residyn_core::lanes::{Element, Row};
 use residyn_core::model::chain::{Chain, Drivetrain, Inertia, Joint, Pose, model_text};
 use residyn_core::model::{Library, Model};
 
-/// Of each time the best of so many.
+/// Each time is the best of this many runs.
 const REPEATS: usize = 7;
-/// States of one measurement.
+/// States per measurement.
 const STATES: usize = 200_000;
 
-/// Joints that turn about axes across each other, each link a rod.
+/// Revolute joints about perpendicular axes, each link a rod.
 fn chain(joints: usize) -> Model {
     let joint = |k: usize| Joint {
         name: format!("joint{}", k + 1),
@@ -60,7 +60,7 @@ fn chain(joints: usize) -> Model {
     Model::from_text(Path::new("chain.toml"), &text, library.effects()).expect("a chain")
 }
 
-/// Nanoseconds of one state; inputs from `held` on are parameters, of these values.
+/// Nanoseconds per state; inputs from `held` on are parameters with these values.
 fn nanoseconds<T: Element, const W: usize>(program: &Program, held: usize, values: &[f64]) -> f64 {
     let number = |x: f64| T::from_f64(x).expect("a number");
     let mut tape = program.tape_with_held::<T, W>(held);

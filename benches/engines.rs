@@ -1,6 +1,6 @@
 //! What the engines cost. `cargo bench` runs all of it; `benches/compare` sets it beside JAX and PyTorch.
 //!
-//! The work is that of `benches/peers.py`: the same models, the same numbers of transitions, candidates and steps.
+//! The work matches `benches/peers.py`: the same models and the same numbers of transitions, candidates and steps.
 
 mod search;
 mod work;
@@ -20,7 +20,7 @@ use residyn_core::lanes::{Arch, Element, Simd, Vector, WithSimd};
 use residyn_core::model::{Dynamics, Library, MlpSettings, MlpWeights};
 use residyn_core::sim::batch::{Rollouts, Rows};
 
-/// One of the two systems on which the published method was tried.
+/// One of the two systems on which the published method was tested.
 struct Task {
     name: &'static str,
     parameters: &'static [(&'static str, f64)],
@@ -66,7 +66,7 @@ impl Task {
     }
 }
 
-/// Epochs that one measurement takes together.
+/// Epochs per measurement.
 const EPOCHS: usize = 1000;
 
 fn train(c: &mut Criterion) {
@@ -127,12 +127,12 @@ fn rollout(c: &mut Criterion) {
     }
 }
 
-/// Sums that do not wait for each other, as many as hide the latency of a multiply-add.
+/// Independent sums, enough to hide the latency of a multiply-add.
 const SUMS: usize = 12;
-/// Multiply-adds of each.
+/// Multiply-adds per sum.
 const ROUNDS: usize = 10_000;
 
-/// The fastest that one core multiplies and adds: nothing but independent operations on registers.
+/// Peak multiply-add rate of one core: independent operations on registers only.
 struct Peak;
 
 impl WithSimd for Peak {
@@ -171,7 +171,7 @@ fn lanes(arch: Arch) -> usize {
     arch.dispatch(Lanes)
 }
 
-/// The logs of `residyn closeloop` without arguments, from declared model to named effect.
+/// The logs of `residyn closeloop` without arguments, from the declared model to the named effect.
 fn identify(c: &mut Criterion) {
     let library = Library::built_in();
     let demo = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/demo.toml"));

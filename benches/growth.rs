@@ -1,7 +1,7 @@
 //! How the engines' cost grows with the size of the work. `benches/growth` runs this and draws the result.
 //!
-//! Prints one JSON object a measurement: what was done, which size was changed, its value, the time and the memory
-//! that the process has needed so far.
+//! Prints one JSON object per measurement: what was done, which size was varied, its value, the time, and the process's
+//! peak memory so far.
 
 mod search;
 mod work;
@@ -18,18 +18,18 @@ use residyn_core::identify::{Shooting, cut, fit};
 use residyn_core::model::{Dynamics, Library, MlpSettings, MlpWeights, Model};
 use residyn_train::Progress;
 
-/// Of each time the best of so many.
+/// Each time is the best of this many runs.
 const REPEATS: usize = 5;
 
-/// One piece of work, of which one size at a time is changed.
+/// One piece of work; one size is varied at a time.
 #[derive(Clone, Copy)]
 struct Work {
     joints: usize,
     width: usize,
-    /// Of training.
+    /// Training.
     transitions: usize,
     steps: usize,
-    /// Of planning.
+    /// Planning.
     population: usize,
     horizon: usize,
 }
@@ -59,7 +59,7 @@ impl Work {
         let begin = work::training(&chain(self.joints), &self.network(), epochs);
         best(|| {
             let mut training = begin.clone();
-            // From one epoch to the next: neither the first nor what is recorded at the ends counts.
+            // From one epoch to the next: neither the first epoch nor recording at the ends counts.
             let (mut last, mut shortest) = (None::<Instant>, f64::INFINITY);
             let mut observe = |_: &Progress| {
                 let now = Instant::now();
@@ -115,7 +115,7 @@ fn chain(joints: usize) -> Dynamics {
     system.dynamics()
 }
 
-/// Seconds of fitting the pendulum to logs of this length.
+/// Seconds to fit the pendulum to logs of this length.
 fn identification(duration_s: f64) -> f64 {
     let library = Library::built_in();
     let mut rig = read_plant(Path::new("pendulum"), &library).expect("a built-in system");
@@ -129,7 +129,7 @@ fn identification(duration_s: f64) -> f64 {
     let active = [0, 1];
     best(|| {
         seconds(|| {
-            let states = shooting.initial_locals(0);
+            let states = shooting.initial_start_states(0);
             let fitted = fit(&shooting, &dynamics, &active, states, None);
             drop(fitted.expect("a model that stays finite"));
         })
@@ -148,7 +148,7 @@ fn best(mut measure: impl FnMut() -> f64) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The most memory that this process has had so far, in MiB; none where the system does not tell.
+/// Peak memory of this process so far, in MiB; `None` if the system does not report it.
 fn memory_mib() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
@@ -163,7 +163,7 @@ fn tell(work: &str, size: &str, value: usize, seconds: f64) {
     println!("{line}");
 }
 
-/// Measure one kind of work over values of one size.
+/// Measure one kind of work over a range of one size.
 fn sweep(work: &str, size: &str, values: &[usize], seconds: impl Fn(usize) -> f64) {
     for &value in values {
         tell(work, size, value, seconds(value));

@@ -45,7 +45,7 @@ fn main() {
     }
 }
 
-/// The published network for so many joints.
+/// The published network for this number of joints.
 fn network(joints: usize) -> MlpWeights {
     work::network(joints, &MlpSettings::for_joints(joints))
 }
@@ -73,26 +73,26 @@ fn epochs(name: &str, times: usize) {
     black_box(ended.expect("training does not diverge"));
 }
 
-/// A swing with a torque, recorded without noise.
+/// A swing driven by a torque, recorded without noise.
 fn log() -> Log {
     let rig = read_plant(Path::new("pendulum"), &Library::built_in()).expect("a built-in rig");
     let log = rig.record(&mut ChaCha8Rng::seed_from_u64(4));
     log.expect("a rig that does not diverge")
 }
 
-/// The linearisation of all windows and the step that it gives.
+/// The linearisation of all windows and the resulting step.
 fn gauss_newton_steps(times: usize) {
     let (dynamics, logs) = (dynamics("pendulum"), [log()]);
     let shooting = Shooting::new(&logs, cut(&logs, WINDOW_S), &[NOISE]);
-    let locals = shooting.initial_locals(0);
+    let start_states = shooting.initial_start_states(0);
     let free: Vec<usize> = (0..dynamics.parameters.len()).collect();
     for _ in 0..times {
-        let cost = predicted_cost(&shooting, &dynamics, &free, &locals, 1.0);
+        let cost = predicted_cost(&shooting, &dynamics, &free, &start_states, 1.0);
         black_box(cost.expect("a model that does not diverge"));
     }
 }
 
-/// The file of a system, from text to program.
+/// A system's file, from text to program.
 fn parse(times: usize) {
     for _ in 0..times {
         black_box(dynamics(black_box("acrobot")));

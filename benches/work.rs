@@ -24,7 +24,7 @@ pub fn network(joints: usize, settings: &MlpSettings) -> MlpWeights {
     MlpWeights::new(joints, settings, scaling, LastLayer::Random, &mut rng)
 }
 
-/// Segments of so many steps with random states and inputs, which is all that the cost depends on.
+/// Segments of `steps` steps with random states and inputs: the cost depends on these sizes alone.
 pub fn segments(joints: usize, steps: usize, count: usize) -> Segments {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut draw =
@@ -40,7 +40,7 @@ pub fn segments(joints: usize, steps: usize, count: usize) -> Segments {
     segments
 }
 
-/// The training of a hybrid model, recorded at its end alone.
+/// Training of a hybrid model, recorded only at its end.
 pub fn training(dynamics: &Dynamics, network: &MlpWeights, epochs: usize) -> Training {
     let model = HybridModel::physics(dynamics, &Backend::NdArray.device())
         .and_then(|model| model.with_residual(network))

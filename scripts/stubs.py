@@ -1,8 +1,8 @@
-"""The docstrings of the stub `residyn/_residyn.pyi`, for editors: they stand in the Rust sources, and are copied from there.
+"""The docstrings of the stub `residyn/_residyn.pyi`, for editors: they are copied from the Rust sources.
 
     python scripts/stubs.py    # with the package installed: brings the stub up to date
 
-The stub is written by hand but for them.
+The rest of the stub is written by hand.
 """
 
 import ast
@@ -18,9 +18,9 @@ Documented = ast.ClassDef | ast.FunctionDef
 
 
 def with_docstrings(stub: str, module: ModuleType) -> str:
-    """The text of a stub with the docstrings of the compiled module in place of its own."""
+    """The text of a stub with its docstrings replaced by those of the compiled module."""
     lines = stub.splitlines(keepends=True)
-    # From the end, so that the lines before stay where they are.
+    # From the end, so that earlier lines keep their numbers.
     for node, owner in reversed(list(_public(ast.parse(stub), module))):
         text = inspect.cleandoc(getattr(owner, node.name).__doc__ or "")
         if not text:
@@ -30,7 +30,7 @@ def with_docstrings(stub: str, module: ModuleType) -> str:
 
 
 def _public(tree: ast.Module | ast.ClassDef, owner: ModuleType | type) -> list[tuple[Documented, ModuleType | type]]:
-    """What the stub declares, in its order, each with what it is an attribute of."""
+    """The stub's declarations, in order, each with the object that it is an attribute of."""
     found: list[tuple[Documented, ModuleType | type]] = []
     for node in tree.body:
         if isinstance(node, Documented) and not node.name.startswith("_"):

@@ -1,8 +1,8 @@
 //! Residyn: from a rig's log to the physical effect that its model lacks.
 //!
 //! A model is a file; its equations are parsed once into one small program, and everything else reads that program.
-//! [`close_loop`] fits a declared model to logs and names the effects that it lacks. What follows finds them, predicts a
-//! log with them, and writes the report:
+//! [`close_loop`] fits a declared model to logs and names the effects that it lacks. The following finds them, predicts
+//! a log with them, and writes the report:
 //!
 //! ```
 //! use residyn::{Library, Origin, Request, close_loop, read_log, read_logs, report, rng};
@@ -33,8 +33,8 @@
 //! # }
 //! ```
 //!
-//! Nothing of that needs a file: [`Library::with_effect`] and [`Library::model_from_text`] take texts, [`Channels`] makes a
-//! log of arrays. What these names do not reach is in the crates behind them:
+//! None of this needs a file: [`Library::with_effect`] and [`Library::model_from_text`] take texts, [`Channels`] makes
+//! a log from arrays. Everything beyond these names is in the crates behind them:
 //!
 //! | crate | holds |
 //! |---|---|

@@ -17,7 +17,7 @@ use crate::support::clients::client;
 use crate::support::mechanisms::{fixture, read_to};
 use crate::support::{measured, refuses, succeeds, text};
 
-/// What Pinocchio and MuJoCo say of an arm.
+/// Results of Pinocchio and MuJoCo for an arm.
 #[derive(Deserialize)]
 struct Arm {
     file: PathBuf,
@@ -31,14 +31,14 @@ fn numbers(sample: &Value, key: &str) -> Vec<f64> {
     serde_json::from_value(sample[key].clone()).unwrap()
 }
 
-/// Largest difference over the largest of the wanted numbers.
+/// Largest difference, relative to the largest of the wanted numbers.
 fn off(found: &[f64], wanted: &[f64]) -> f64 {
     let differences = found.iter().zip(wanted).map(|(a, b)| (a - b).abs());
     let size = wanted.iter().map(|x| x.abs()).fold(0.0, f64::max);
     differences.fold(0.0, f64::max) / size
 }
 
-/// Energy changes by the power of the torques, with a joint that follows another as well.
+/// Energy changes by the power of the torques, also if a joint follows another.
 #[test]
 fn energy_of_a_linkage_changes_by_the_power() {
     let model = model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
@@ -53,7 +53,7 @@ fn energy_of_a_linkage_changes_by_the_power() {
     }
 }
 
-/// A chain ends where it is told to; what hangs on it elsewhere moves with it.
+/// A chain ends at the requested link; bodies attached elsewhere move with it.
 #[test]
 fn branches_are_welded_and_noted() {
     let file = fixture("linkage_4r.urdf");
@@ -67,7 +67,7 @@ fn branches_are_welded_and_noted() {
     let slide = &whole.joints[3];
     assert!((slide.inertia.mass - 0.9).abs() < 1e-15);
     assert!(!whole.notes.iter().any(|n| n.contains("what acts on")));
-    // What a joint off the chain does is of no interest.
+    // The effects of a joint off the chain do not matter.
     let folder = tempfile::tempdir().unwrap();
     let other = folder.path().join("other.urdf");
     let description = fs::read_to_string(&file).unwrap();
@@ -95,8 +95,8 @@ fn branches_are_welded_and_noted() {
     );
 }
 
-/// Error of the torques of an arm as its URDF describes it, in per cent of the logged torques: on the rows of a log from this
-/// share of them on.
+/// Error of the torques of an arm as its URDF describes it, in per cent of the logged torques, on a log's rows from
+/// this fraction on.
 fn error_of_torques(arm: &str, log: &str, from: f64) -> Option<f64> {
     let data = measured(arm)?;
     let folder = tempfile::tempdir().unwrap();
@@ -116,20 +116,23 @@ fn error_of_torques(arm: &str, log: &str, from: f64) -> Option<f64> {
     ]);
     let (model, part) = (text(&model), text(&part));
     let horizon = ["--horizon", "0.02", "--torque", "--json"];
-    let told = succeeds(
+    let message = succeeds(
         &[
             &["evaluate", "--model", model, "--test", part],
             &horizon[..],
         ]
         .concat(),
     );
-    let told: Value = serde_json::from_str(&told).unwrap();
-    let joints = told["torque"]["rms"].as_array().unwrap().len();
-    assert_eq!(joints, told["position_rmse"][0].as_array().unwrap().len());
-    Some(100.0 * told["torque"]["relative"].as_f64().unwrap())
+    let message: Value = serde_json::from_str(&message).unwrap();
+    let joints = message["torque"]["rms"].as_array().unwrap().len();
+    assert_eq!(
+        joints,
+        message["position_rmse"][0].as_array().unwrap().len()
+    );
+    Some(100.0 * message["torque"]["relative"].as_f64().unwrap())
 }
 
-/// The same numbers by another program, from the READMEs of the data sets.
+/// The same numbers from another program, in the READMEs of the data sets.
 #[test]
 fn torques_of_measured_arms_are_off_by_what_others_find() {
     for (arm, log, from, wanted) in [
@@ -146,7 +149,7 @@ fn torques_of_measured_arms_are_off_by_what_others_find() {
 
 /// Both logs follow the same reference.
 #[test]
-fn the_same_motion_of_a_measured_arm_is_told() {
+fn the_same_motion_of_a_measured_arm_is_reported() {
     let Some(data) = measured("kuka_lwr4") else {
         return;
     };
@@ -194,8 +197,8 @@ fn torques_need_a_model_of_torques_and_a_log_of_a_second() {
     assert!(said.contains("pendulum gives accelerations"), "{said}");
 }
 
-/// The parameters of bodies that are off by a tenth or two come back from torques, as far as the motion tells them, and
-/// friction with them; what it does not tell stays, and every body stays one.
+/// Body parameters that are off by 10 to 20 % are recovered from torques, as far as the motion determines them,
+/// together with friction; the others stay, and every body remains physical.
 #[test]
 fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
     let declared = model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
@@ -219,11 +222,11 @@ fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
     let with = |level: f64| {
         declared
             .with_effects(friction(level))
-            .with_sign_widths(vec![0.02; 4])
+            .with_smoothing_velocities(vec![0.02; 4])
     };
     let mut rig = with(0.4);
     for (k, body) in rig.inertias().into_iter().enumerate() {
-        // Another body of the same shape: still one.
+        // Another body of the same shape: still physical.
         let factor = [1.2, 0.85, 1.15, 0.9, 1.25][k];
         for parameter in body {
             rig.parameters[parameter].value *= factor;
@@ -238,7 +241,7 @@ fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
     );
     let error = |model: &Model| torque_error(model, &test).unwrap().relative;
     let [before, after, best] = [&with(0.4), &found.model, &rig].map(error);
-    // The rig's own model is off where friction reverses, since motion and torque are smoothed.
+    // The rig's own model has errors where friction reverses, since motion and torque are smoothed.
     assert!(
         before > 1.7 * best && after < 1.01 * best,
         "{before} {after} {best}"
@@ -276,8 +279,8 @@ fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
     }
 }
 
-/// Fitted near what its URDF declares, with the friction that every arm has, an arm's torques on a part of its log that was
-/// not fitted are as near as by least squares on base parameters, figures of the READMEs of the data sets.
+/// Fitted near its URDF's values, with the friction that every arm has, an arm's torques on the part of its log that
+/// was not fitted are as accurate as by least squares on base parameters (figures in the READMEs of the data sets).
 #[test]
 fn fitted_torques_of_measured_arms_are_as_near_as_by_least_squares() {
     for (arm, train, test, first_s, share, least_squares) in [
@@ -317,7 +320,7 @@ fn fitted_torques_of_measured_arms_are_as_near_as_by_least_squares() {
         train.leave_out = vec![span(-1.0, first_s)];
         test.leave_out = vec![span(-1.0, first_s)];
         if share < 1.0 {
-            // Half a second at the ends of either part is not used.
+            // Half a second at the ends of either part is left out.
             train.leave_out.push(span(split_s - 0.5, f64::INFINITY));
             test.leave_out.push(span(-1.0, split_s + 0.5));
         }
@@ -329,7 +332,9 @@ fn fitted_torques_of_measured_arms_are_as_near_as_by_least_squares() {
         };
         let effects: Vec<FittedEffect> = Joint::all(declared.joints).flat_map(of_joint).collect();
         let widths = vec![0.02; declared.joints];
-        let with = declared.with_effects(effects).with_sign_widths(widths);
+        let with = declared
+            .with_effects(effects)
+            .with_smoothing_velocities(widths);
         let found = fit_torques(&with, &declared, &[train]).unwrap().model;
         let error = 100.0 * torque_error(&found, &[test]).unwrap().relative;
         assert!(
@@ -347,10 +352,10 @@ mod slow {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("arms.json");
         client("arms.py", &[fixture("").as_path(), &file]);
-        let Ok(told) = fs::read_to_string(&file) else {
+        let Ok(message) = fs::read_to_string(&file) else {
             return;
         };
-        let arms: Vec<Arm> = serde_json::from_str(&told).unwrap();
+        let arms: Vec<Arm> = serde_json::from_str(&message).unwrap();
         assert!(arms.len() > 10, "{} arms", arms.len());
         for arm in arms {
             let name = arm.file.display();
@@ -379,7 +384,7 @@ mod slow {
                     );
                     let found = forward.program.eval(&inputs(&wanted));
                     let found = &found[model.joints..];
-                    // Where axes of a light wrist are in line, rounding of the torques moves it.
+                    // Where axes of a light wrist align, rounding of the torques changes it.
                     let moved = off(found, &qdd);
                     assert!(moved < 1e-7, "{name}: {peer}: {found:?}, {qdd:?}");
                     let torques = needed(found);

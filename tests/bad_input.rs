@@ -6,7 +6,7 @@ use crate::support::{Scratch, refuses, residyn, says, succeeds, text};
 
 const GOOD: &str = "time,q1,qd1,tau1\n0,0.1,0,0\n0.01,0.1,0,0\n0.02,0.1,0,0\n";
 
-/// What closing the loop on a log says; no folder may come of it.
+/// The output of closing the loop on a log; it must not create a folder.
 fn closeloop(model: &str, log: &str) -> String {
     let scratch = Scratch::new();
     let (log, out) = (scratch.file("log.csv", log), scratch.out());
@@ -72,7 +72,7 @@ fn a_log_that_is_too_short_to_fit_says_so() {
     says(&closeloop("pendulum", GOOD), &["too short", "--test"]);
 }
 
-/// What a model file with this change of the pendulum's says.
+/// The error message for a pendulum model file with this change.
 fn model_message(from: &str, to: &str) -> String {
     closeloop(&Scratch::new().model("model.toml", from, to), GOOD)
 }

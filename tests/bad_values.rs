@@ -15,7 +15,7 @@ use crate::support::{
     text, until_there,
 };
 
-/// What the program says that refuses its arguments while its memory is bounded.
+/// The message with which the program refuses its arguments, run in limited memory.
 #[cfg(unix)]
 fn refuses_in_little_memory(arguments: &[&str]) -> String {
     let output = residyn_within(200_000, arguments);
@@ -25,7 +25,7 @@ fn refuses_in_little_memory(arguments: &[&str]) -> String {
     message
 }
 
-/// A model of one joint that gives a mass and a bias, so that its motion is compared with its torques.
+/// A model of one joint that gives a mass and a bias, so that its motion is compared through its torques.
 const MASS_AND_BIAS: &str = r#"
 [system]
 name = "arm"
@@ -71,8 +71,11 @@ fn logs_without_motion_get_an_answer() {
         .flat_map(|model| logs.iter().map(move |log| (model, log)));
     for (model, log) in each {
         let out = scratch.out();
-        let told = answers(&["closeloop", "--model", model, "--train", log, "--out", &out]);
-        assert!(told.contains("no joint moves visibly"), "{model}: {told}");
+        let message = answers(&["closeloop", "--model", model, "--train", log, "--out", &out]);
+        assert!(
+            message.contains("no joint moves visibly"),
+            "{model}: {message}"
+        );
     }
 }
 
@@ -96,7 +99,7 @@ fn a_model_of_more_parameters_than_can_be_fitted_is_refused() {
         scratch.file("sines.toml", text),
         scratch.log("log.csv", swinging),
     );
-    let told = refuses(&[
+    let message = refuses(&[
         "closeloop",
         "--model",
         &model,
@@ -106,7 +109,7 @@ fn a_model_of_more_parameters_than_can_be_fitted_is_refused() {
         &scratch.out(),
     ]);
     says(
-        &told,
+        &message,
         &[
             "note: ",
             "grows with the cube",
@@ -127,7 +130,7 @@ fn a_log_in_which_one_joint_of_two_rests_gets_an_answer() {
         writeln!(log, "{time:?},{q:?},0,{qd:?},0,{tau:?},0").unwrap();
     }
     let (log, out) = (scratch.file("log.csv", log), scratch.out());
-    let told = answers(&[
+    let message = answers(&[
         "closeloop",
         "--budget",
         "0s",
@@ -138,7 +141,7 @@ fn a_log_in_which_one_joint_of_two_rests_gets_an_answer() {
         "--out",
         &out,
     ]);
-    assert!(told.contains("joint 2, 0.5 s ahead"), "{told}");
+    assert!(message.contains("joint 2, 0.5 s ahead"), "{message}");
 }
 
 #[test]
@@ -152,8 +155,11 @@ fn a_reading_that_no_sensor_has_is_refused_with_its_place() {
             }
             row
         });
-        let told = refuses(&["evaluate", "--model", "pendulum", "--test", &log]);
-        says(&told, &["log.csv, line 102", name, "1e300 is beyond 1e30"]);
+        let message = refuses(&["evaluate", "--model", "pendulum", "--test", &log]);
+        says(
+            &message,
+            &["log.csv, line 102", name, "1e300 is beyond 1e30"],
+        );
     }
 }
 
@@ -176,8 +182,8 @@ fn formulas_that_are_too_deep_or_too_long_are_refused() {
     ];
     for (formula, limit) in cases {
         let model = scratch.moving_by("model.toml", &formula);
-        let told = refuses_in_little_memory(&["check", &model]);
-        says(&told, &["model.toml, line 11, column 8", limit]);
+        let message = refuses_in_little_memory(&["check", &model]);
+        says(&message, &["model.toml, line 11, column 8", limit]);
     }
     let sum = vec!["sin(q1)"; 300].join(" + ");
     let model = scratch.moving_by("model.toml", &vec![format!("({sum})"); 40].join(" * "));
@@ -205,8 +211,8 @@ fn files_with_too_much_of_anything_are_refused() {
         &format!("[dynamics.let]\n{lets}\n[energy]"),
     );
     for model in [parameters, lets] {
-        let told = refuses_in_little_memory(&["check", &model]);
-        says(&told, &["line ", "entries; at most 1000 are read"]);
+        let message = refuses_in_little_memory(&["check", &model]);
+        says(&message, &["line ", "entries; at most 1000 are read"]);
     }
     let long = scratch.file("long.toml", vec![b'#'; 5 << 20]);
     says(
@@ -215,8 +221,8 @@ fn files_with_too_much_of_anything_are_refused() {
     );
     let header: Vec<String> = (0..100_000).map(|k| format!("q{k}")).collect();
     let wide = scratch.file("wide.csv", header.join(",") + "\n");
-    let told = refuses_in_little_memory(&["audit", &wide]);
-    says(&told, &["wide.csv", "100000 columns; at most 4096"]);
+    let message = refuses_in_little_memory(&["audit", &wide]);
+    says(&message, &["wide.csv", "100000 columns; at most 4096"]);
     let unknown: Vec<String> = (0..4000).map(|k| format!("column{k}")).collect();
     let unknown = scratch.file("unknown.csv", unknown.join(",") + "\n");
     says(
@@ -226,8 +232,8 @@ fn files_with_too_much_of_anything_are_refused() {
     let bodies = "<body>".repeat(60_000) + &"</body>".repeat(60_000);
     let deep = format!("<mujoco><worldbody>{bodies}</worldbody></mujoco>");
     let deep = scratch.file("deep.xml", deep);
-    let told = refuses_in_little_memory(&["new", "--from-mjcf", &deep]);
-    says(&told, &["deep.xml, line 1", "more than 200 elements"]);
+    let message = refuses_in_little_memory(&["new", "--from-mjcf", &deep]);
+    says(&message, &["deep.xml, line 1", "more than 200 elements"]);
 }
 
 #[test]
@@ -344,8 +350,8 @@ fn numbers_in_files_are_finite() {
             "step_s = 0.02",
             &format!("step_s = {number}"),
         );
-        let told = refuses(&["train", "--config", &recipe, "--out", &scratch.out()]);
-        says(&told, &["train-pendulum.toml", "line ", number]);
+        let message = refuses(&["train", "--config", &recipe, "--out", &scratch.out()]);
+        says(&message, &["train-pendulum.toml", "line ", number]);
     }
     let model = scratch.moving_by("model.toml", "1e999 * tau1");
     says(
@@ -372,7 +378,7 @@ fn names_are_those_that_formulas_can_use() {
     }
 }
 
-/// A checkpoint, exported as JSON with weights beside it, and what the JSON says.
+/// A checkpoint, exported as JSON with its weights in a separate file, and the contents of the JSON.
 fn exported(scratch: &Scratch) -> (String, Value) {
     let checkpoint = text(&scratch.path("checkpoint")).to_owned();
     let json = text(&scratch.path("model.json")).to_owned();
@@ -422,21 +428,21 @@ fn a_description_names_no_file_but_the_one_beside_it() {
         let file = scratch.file("sub/model.json", other.to_string());
         says(&import(&file), &["sub/model.json", "no file beside it"]);
     }
-    // What a user names may be a link, but has an end.
+    // A path from the user may be a link, but it must be finite.
     for name in ["weights.safetensors", "model.toml", "checkpoint.json"] {
         let path = scratch.path("checkpoint").join(name);
         fs::rename(&path, scratch.path("kept")).unwrap();
         symlink("/dev/zero", &path).unwrap();
         let checkpoint = scratch.path("checkpoint");
         let log = scratch.log("log.csv", swinging);
-        let told = refuses_in_little_memory(&[
+        let message = refuses_in_little_memory(&[
             "evaluate",
             "--checkpoint",
             text(&checkpoint),
             "--test",
             &log,
         ]);
-        says(&told, &[name, "a device or a pipe, not a regular file"]);
+        says(&message, &[name, "a device or a pipe, not a regular file"]);
         fs::remove_file(&path).unwrap();
         fs::rename(scratch.path("kept"), &path).unwrap();
     }
@@ -450,18 +456,18 @@ fn a_description_of_other_joints_is_refused() {
     for joints in [50_u64, 1_000_000_000] {
         said["joints"] = joints.into();
         fs::write(&json, said.to_string()).unwrap();
-        let told = refuses(&["import", "--file", &json, "--out", &scratch.out()]);
+        let message = refuses(&["import", "--file", &json, "--out", &scratch.out()]);
         says(
-            &told,
+            &message,
             &[
                 "model.json",
                 &format!("`joints` is {joints}, its model file has 1"),
             ],
         );
         let model = scratch.model("model.toml", "joints = 1", &format!("joints = {joints}"));
-        let told = refuses(&["check", &model]);
+        let message = refuses(&["check", &model]);
         says(
-            &told,
+            &message,
             &[
                 "line 4",
                 &format!("`joints` is from 1 to 12, found {joints}"),
@@ -501,8 +507,8 @@ fn what_never_begins_or_never_ends_is_no_input() {
             &["import", "--file", file, "--out", &out],
         ];
         for command in commands {
-            let told = refuses_in_little_memory(command);
-            says(&told, &[file, "a device or a pipe, not a regular file"]);
+            let message = refuses_in_little_memory(command);
+            says(&message, &[file, "a device or a pipe, not a regular file"]);
         }
     }
     says(
@@ -511,7 +517,7 @@ fn what_never_begins_or_never_ends_is_no_input() {
     );
 }
 
-/// A file that holds so many times this, packed with gzip behind a header.
+/// A file with `part` repeated this many times, packed with gzip after a header.
 fn packed(scratch: &Scratch, name: &str, header: &str, part: &str, times: usize) -> String {
     let level = flate2::Compression::fast();
     let mut packer = flate2::write::GzEncoder::new(Vec::new(), level);
@@ -521,7 +527,7 @@ fn packed(scratch: &Scratch, name: &str, header: &str, part: &str, times: usize)
     scratch.file(name, packer.finish().unwrap())
 }
 
-/// An archive with arrays of this many bytes, each a number.
+/// An archive with arrays of this many bytes, one byte per number.
 fn archive_of_bytes(scratch: &Scratch, name: &str, megabytes: usize) -> String {
     let path = scratch.path(name);
     let mut archive = zip::ZipWriter::new(fs::File::create(&path).unwrap());
@@ -562,9 +568,9 @@ fn packed_files_hold_no_more_than_is_read() {
         archive_of_bytes(&scratch, "short.npz", 2),
     ];
     for file in files {
-        let told = refuses_in_little_memory(&["audit", &file]);
+        let message = refuses_in_little_memory(&["audit", &file]);
         says(
-            &told,
+            &message,
             &[
                 &file,
                 "more than 16 MB and 20 times its size",
@@ -587,8 +593,8 @@ fn malformed_xml_is_placed() {
         ("  <link name='c'>", "line 3, column 18"),
     ] {
         let file = scratch.file("robot.urdf", format!("{head}{tail}"));
-        let told = refuses(&["new", "--from-urdf", &file]);
-        says(&told, &["robot.urdf", place, "not valid XML"]);
+        let message = refuses(&["new", "--from-urdf", &file]);
+        says(&message, &["robot.urdf", place, "not valid XML"]);
     }
 }
 
@@ -604,9 +610,9 @@ fn definitions_in_a_circle_are_shown_as_one() {
     ] {
         let lets = format!("[dynamics.let]\n{lets}\n\n[energy]");
         let model = scratch.model("model.toml", "[energy]", &lets);
-        let told = refuses(&["check", &model]);
+        let message = refuses(&["check", &model]);
         says(
-            &told,
+            &message,
             &["model.toml, line 14", "`a` is defined by itself", circle],
         );
     }
@@ -621,9 +627,9 @@ fn a_singular_mass_matrix_is_called_so_where_it_stops_the_motion() {
          [dynamics]\nmass = [[\"I\"]]\nbias = [\"0\"]\n",
     );
     let out = scratch.out();
-    let told = ends_without(&["simulate", "--plant", &model, "--out", &out]);
+    let message = ends_without(&["simulate", "--plant", &model, "--out", &out]);
     says(
-        &told,
+        &message,
         &[
             "diverges at 0.000 s",
             "the mass matrix is singular",
@@ -703,8 +709,11 @@ fn a_log_of_more_joints_than_any_rig_has_is_refused() {
     let header: String = (1..=101).map(|joint| format!(",q{joint}")).collect();
     let row = ",0".repeat(101);
     let log = format!("time{header}\n0{row}\n1{row}\n");
-    let told = refuses(&["audit", &scratch.file("log.csv", log)]);
-    says(&told, &["log.csv", "has 101 joints; at most 100 are read"]);
+    let message = refuses(&["audit", &scratch.file("log.csv", log)]);
+    says(
+        &message,
+        &["log.csv", "has 101 joints; at most 100 are read"],
+    );
 }
 
 #[test]
@@ -716,9 +725,9 @@ fn a_simulation_that_would_not_end_is_refused() {
         .replace(line("rate_hz"), "rate_hz = 1e-6")
         .replace(line("duration_s"), "duration_s = 1e7");
     let plant = scratch.file("slow.toml", slow);
-    let told = refuses(&["simulate", "--plant", &plant, "--out", &scratch.out()]);
+    let message = refuses(&["simulate", "--plant", &plant, "--out", &scratch.out()]);
     says(
-        &told,
+        &message,
         &["slow.toml", "`recording.duration_s` is at most 1e5 s"],
     );
 }
@@ -755,8 +764,8 @@ mod slow {
         let process = format!("process {},", first.id());
         let train = ["train", "--config", &config("smoke/train-pendulum.toml")];
         for second in [&["closeloop"][..], &train] {
-            let told = refuses(&[second, &["--out", &out]].concat());
-            says(&told, &[&out, &process, "is working there", "--out"]);
+            let message = refuses(&[second, &["--out", &out]].concat());
+            says(&message, &[&out, &process, "is working there", "--out"]);
         }
         first.kill().unwrap();
         first.wait().unwrap();

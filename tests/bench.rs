@@ -26,7 +26,7 @@ fn the_full_grid_has_cells_of_every_group_and_hides_every_kind_of_effect() {
     assert!(of(Group::Pair) >= 25, "{}", of(Group::Pair));
     assert!(of(Group::None) >= 20, "{}", of(Group::None));
     assert!(of(Group::Outside) >= 20, "{}", of(Group::Outside));
-    // What arms hide is drawn.
+    // The hidden effects of arms are drawn at random.
     let library = Library::built_in();
     let arms = read(&path("arms.toml")).unwrap();
     let settled: Vec<Cell> = arms
@@ -41,14 +41,14 @@ fn the_full_grid_has_cells_of_every_group_and_hides_every_kind_of_effect() {
     assert!(names.is_empty(), "no cell hides {names:?}");
 }
 
-/// Values of the rig's parameters as the model file calls them.
+/// Values of the rig's parameters under the model file's names.
 fn true_value(mechanics: &Mechanics, name: &str) -> Option<f64> {
     let rig = serde_json::to_value(mechanics).unwrap();
     let declared = mechanics.declared(0.0).get(name).copied();
     declared.or_else(|| rig.get(name)?.as_f64())
 }
 
-/// The library's effect with the true numbers, where it is one of force, torque, angle or inertia.
+/// The library's effect with the true numbers, if it is an effect of force, torque, angle or inertia.
 fn known(library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
     let effect = library.effect(&hidden.name).ok()?;
     let mut known = FittedEffect::absent(effect, hidden.joint);
@@ -58,7 +58,7 @@ fn known(library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
     Some(known)
 }
 
-/// Memory and sensors are no part of the equations of motion.
+/// Memory and sensors are not part of the equations of motion.
 const NOT_IN_THE_EQUATIONS: [&str; 6] = [
     "actuator_delay",
     "actuator_lag",
@@ -67,7 +67,7 @@ const NOT_IN_THE_EQUATIONS: [&str; 6] = [
     "sensor_offset",
     "parameter_shift",
 ];
-/// Angles half a second ahead agree within this \[rad\]: friction that holds a joint there lets it creep here.
+/// Angles half a second ahead agree within this \[rad\]: friction that holds a joint in the rig lets it creep here.
 const NEAR: f64 = 1e-4;
 
 #[test]
@@ -178,7 +178,7 @@ mod slow {
             let (logs, _) = cell.record(&system).unwrap();
             let error = |effects: &[FittedEffect]| {
                 let rig = system.with_effects(effects.to_vec());
-                let mut rig = rig.with_sign_widths(vec![1e-4; system.joints]);
+                let mut rig = rig.with_smoothing_velocities(vec![1e-4; system.joints]);
                 for parameter in &mut rig.parameters {
                     parameter.value =
                         true_value(&mechanics, &parameter.name).expect("the rig has it");
@@ -247,7 +247,7 @@ mod slow {
                 .collect::<Vec<_>>()
         };
         assert_eq!(run(&["none"])["cells"], 1);
-        // A line that was broken off is no result, and is cut off.
+        // An incomplete line is not a result, and is cut off.
         let first = lines();
         std::fs::write(out.join("cells.jsonl"), format!("{}\n{{\"conf", first[0])).unwrap();
         let summary = run(&["none", "coulomb"]);
@@ -256,8 +256,8 @@ mod slow {
         let coulomb: serde_json::Value = serde_json::from_str(&lines()[1]).unwrap();
         let errors = &coulomb["findings"]["Ok"]["errors"];
         let error = |which: &str| errors[which].as_f64().unwrap();
-        // Whoever is told of the friction predicts far better than who is not.
-        assert!(error("told") < 0.2 * error("before"), "{errors}");
+        // A model that includes the friction predicts far better than one that does not.
+        assert!(error("message") < 0.2 * error("before"), "{errors}");
         let table = std::fs::read_to_string(out.join("table.md")).unwrap();
         assert!(table.contains("| one effect: exact |"), "{table}");
         crate::support::clients::look_at(&out.join("report.html"));

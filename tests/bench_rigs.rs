@@ -104,7 +104,7 @@ fn a_wrong_file_of_rigs_is_refused_with_the_line_and_a_remedy() {
 }
 
 #[test]
-fn what_the_models_and_logs_of_a_rig_lack_is_told() {
+fn what_the_models_and_logs_of_a_rig_lack_is_reported() {
     for (from, to, part) in [
         (
             "C_i = 5.0",
@@ -175,7 +175,7 @@ mod slow {
             seconds: 1.0,
             found: Ok(method.run(&rig, fold, &tools, &()).unwrap()),
         };
-        // Python has a test of its own.
+        // Python has its own test.
         let here = Method::ALL
             .into_iter()
             .filter(|method| *method != Method::MujocoSysid);
@@ -225,7 +225,7 @@ mod slow {
         let mut line: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
         line["found"] = serde_json::json!({"Err": "the fit diverged"});
         fs::write(&path, line.to_string()).unwrap();
-        // Stored results are used again.
+        // Stored results are reused.
         bench.command(&["--json"], |arguments| {
             let output = residyn(arguments);
             assert_eq!(output.status.code(), Some(1));
@@ -256,8 +256,8 @@ mod slow {
             predicted => rms(&predicted.unwrap()),
         };
         let expected = rms(&errors_on(&model.dynamics(), &fold.test));
-        // MuJoCo's integrator is of first order: over a time t its steps h err by a h t / 2, here by gravity's largest
-        // acceleration in steps of 2 ms.
+        // MuJoCo's integrator is of first order: over a time t its steps h err by a h t / 2, where a is gravity's
+        // largest acceleration and steps are 2 ms.
         let horizons_s = Settings::default().score.horizons_s;
         for ((predicted, expected), horizon_s) in predicted.iter().zip(&expected).zip(horizons_s) {
             let stepping = 0.5 * 19.62 * 2e-3 * horizon_s;

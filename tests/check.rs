@@ -17,7 +17,7 @@ fn check(file: &str) -> Check {
     model.check(&mut rng(0))
 }
 
-/// Every TOML file of a folder of the project that describes a system.
+/// Every TOML file in a folder of the project that describes a system.
 fn shipped(folder: &str) -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
     let files = fs::read_dir(&folder)
@@ -65,7 +65,7 @@ fn the_units_of_all_effects_fit() {
     }
 }
 
-/// A built-in model with one text in place of another, and what is found in it: kind, line, and words.
+/// A built-in model with one text replaced by another, and the resulting finding: kind, line, and words.
 const BROKEN: &[(&str, [&str; 2], Kind, usize, &str)] = &[
     (
         "acrobot",

@@ -46,11 +46,11 @@ fn a_model_swings_up_its_own_plant_and_the_episode_is_written() {
         let log = dir.path().join(format!("e/episode-{number:03}.csv"));
         let log = read_rig_log(&log, 1, &Columns::default()).unwrap();
         assert_eq!(log.rows(), 501);
-        // Without noise the log holds the true states; rewards are those after each step.
+        // Without noise the log holds the true states; rewards are taken after each step.
         let total: f64 = log.q[0][1..].iter().map(|q| q.cos()).sum();
-        let told = episode["return"].as_f64().unwrap();
-        assert!((total - told).abs() < 1e-9, "{total} {told}");
-        assert!(told > 290.0, "{told}");
+        let message = episode["return"].as_f64().unwrap();
+        assert!((total - message).abs() < 1e-9, "{total} {message}");
+        assert!(message > 290.0, "{message}");
         let film =
             fs::read_to_string(dir.path().join(format!("e/episode-{number:03}.svg"))).unwrap();
         assert!(
@@ -91,7 +91,7 @@ fn options_change_the_plant() {
         "{start:?}"
     );
     assert!(log.tau[0].iter().all(|tau| tau.abs() <= 2.0));
-    // Near upright and planned anew every 0.1 s, it stays there in spite of friction that the model lacks.
+    // Near upright, replanning every 0.1 s, it stays there despite friction that the model lacks.
     assert_eq!(found["episodes"][0]["success"], true, "{found}");
 }
 
@@ -145,7 +145,7 @@ fn experiment<'a>(name: &'a str, config: &'a str, out: &'a str) -> [&'a str; 6] 
     ["experiment", name, "--config", config, "--out", out]
 }
 
-/// The error that a recipe's run has on other data, and the model that comes of it.
+/// The error of a recipe's run on other data, and the resulting model.
 fn trained_again(recipe: &str) -> (f64, tempfile::TempDir) {
     let dir = tempfile::tempdir().unwrap();
     let found = json(
@@ -155,7 +155,7 @@ fn trained_again(recipe: &str) -> (f64, tempfile::TempDir) {
     (found["test_error"]["after"].as_f64().unwrap(), dir)
 }
 
-/// What a checkpoint errs on the same data.
+/// A checkpoint's error on the same data.
 fn error_of(checkpoint: &Checkpoint, recipe: &str) -> f64 {
     let recipe = Recipe::read(&configs().join(recipe)).unwrap();
     let job = Job::train(recipe, &Library::built_in(), Backend::NdArray, 0).unwrap();
@@ -171,8 +171,8 @@ fn job_dynamics(job: &Job) -> residyn_core::model::Dynamics {
     Library::built_in().model(&name).unwrap().dynamics()
 }
 
-/// Rounding differs between processors and grows over thousands of epochs, so what must come again everywhere is how
-/// good the model is; on the machine that made it, it comes again bit for bit.
+/// Rounding differs between processors and grows over thousands of epochs, so the model's accuracy must be reproducible
+/// everywhere; on the machine that made it, the model is reproducible bit for bit.
 fn comes_again(name: &str, recipe: &str, most: f64) {
     let checkpoint = Checkpoint::load(Path::new(&shipped(name))).unwrap();
     let shipped = error_of(&checkpoint, recipe);
@@ -188,7 +188,7 @@ fn comes_again(name: &str, recipe: &str, most: f64) {
     assert_eq!(*seen, recipe, "{name} was made by another recipe");
 }
 
-/// The least return of two episodes with a shipped checkpoint on the plant that it was trained on.
+/// The smaller return of two episodes with a shipped checkpoint on the plant that it was trained on.
 fn least_return(name: &str) -> f64 {
     let dir = tempfile::tempdir().unwrap();
     let command = [

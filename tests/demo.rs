@@ -19,7 +19,7 @@ fn first_report() -> &'static Value {
     REPORT.get_or_init(|| demo("0").0)
 }
 
-/// A report but for when and how it was made.
+/// A report without the time and the command that made it.
 fn without_call(mut report: Value) -> Value {
     let call = report["call"].take();
     assert!(call["took_s"].as_f64().unwrap() > 0.0, "{call}");
@@ -41,7 +41,7 @@ fn the_true_value_lies_inside_its_interval() {
 fn the_effect_is_drawn_by_its_formula_with_its_interval() {
     let report = first_report();
     let parameter = &report["effects"][0]["parameters"][0];
-    let curve = &report["shown"]["residuals"][0]["effects"][0];
+    let curve = &report["plots"]["residuals"][0]["effects"][0];
     assert_eq!(
         (&curve["variable"], &curve["effects"]),
         (&"qd".into(), &serde_json::json!(["coulomb_friction"]))
@@ -68,10 +68,10 @@ fn the_effect_is_drawn_by_its_formula_with_its_interval() {
 fn the_pendulum_is_drawn_at_its_logged_angles() {
     let report = first_report();
     let numbers = |of: &Value| -> Vec<f64> { serde_json::from_value(of.clone()).unwrap() };
-    let (motion, stretch) = (&report["shown"]["motion"], &report["shown"]["stretches"][0]);
+    let (motion, segment) = (&report["plots"]["motion"], &report["plots"]["segments"][0]);
     let (logged_s, angles) = (
-        numbers(&stretch["time"]),
-        numbers(&stretch["joints"][0]["measured"]),
+        numbers(&segment["time"]),
+        numbers(&segment["joints"][0]["measured"]),
     );
     let lines = motion["pictures"][0]["measured"].as_array().unwrap();
     let mut sides = Vec::new();
@@ -131,7 +131,7 @@ fn other_commands_read_the_written_files() {
     assert!(fitted < 0.01, "{fitted}");
     let hybrid = error(&["--checkpoint", text(&checkpoint)]);
     assert!((hybrid - fitted).abs() < 0.2 * fitted, "{hybrid} {fitted}");
-    // The written model, closed again, lacks nothing.
+    // The written model, closed again, lacks no effect.
     let again = folder.path().join("again");
     let json = succeeds(&[
         "closeloop",
@@ -161,7 +161,7 @@ fn a_checkpoint_of_another_model_is_refused() {
     };
     let message = refused_on_log_of("acrobot");
     assert!(message.contains("joint"), "{message}");
-    // A checkpoint whose weights belong to another model than its own model file.
+    // A checkpoint whose weights do not belong to its model file.
     let model = include_str!("../models/drive.toml");
     std::fs::write(checkpoint.join("model.toml"), model).unwrap();
     let message = refused_on_log_of("pendulum");
@@ -277,12 +277,12 @@ mod slow {
         );
         let smallest = calibration["smallest"].as_array().unwrap();
         let of = |name: &str| smallest.iter().find(|entry| entry["effect"] == name);
-        // What was found belongs to the model; what is hidden beside it is found.
+        // The effect found belongs to the model; an effect hidden in addition is found.
         assert!(of("coulomb_friction").is_none());
         let drag = of("viscous_friction").unwrap();
         assert!(drag["value"].as_f64().unwrap() > 0.0);
         assert_eq!(drag["verified"], true);
-        // The rest of the report is what it is without.
+        // The rest of the report is the same as without calibration.
         let (plain, _folder) = demo("3");
         assert!(plain["calibration"].is_null());
         assert_eq!(plain["error"], first["error"]);

@@ -16,7 +16,7 @@ struct Record {
     python: BTreeMap<String, Reasons>,
 }
 
-/// What `cargo metadata` and the sources say, too.
+/// Facts that `cargo metadata` and the sources state, too.
 #[derive(Deserialize)]
 struct Crate {
     version: String,
@@ -26,7 +26,7 @@ struct Crate {
     reasons: Reasons,
 }
 
-/// What only people can say.
+/// Judgements that only people can make.
 #[derive(Deserialize)]
 struct Reasons {
     by: String,
@@ -49,7 +49,7 @@ fn record() -> Record {
     toml::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// What Cargo knows of a package, and of the packages that it names itself.
+/// What Cargo knows of a package and of its direct dependencies.
 struct Package<'a> {
     about: &'a Value,
     names: Vec<&'a Value>,
@@ -99,7 +99,7 @@ impl Workspace {
             .collect()
     }
 
-    /// Whether a manifest asks for this very version.
+    /// Whether a manifest pins this exact version.
     fn is_pinned(&self, name: &str) -> bool {
         let members = self.0["workspace_members"].as_array().unwrap();
         members.iter().any(|member| {
@@ -136,7 +136,7 @@ fn powers_of_sources(about: &Value) -> BTreeSet<&'static str> {
     let manifest = Path::new(about["manifest_path"].as_str().unwrap());
     let mut powers = BTreeSet::new();
     for source in sources(manifest.parent().unwrap()) {
-        // A published source may hold other bytes than UTF-8 in its comments.
+        // Comments in a published source may hold bytes that are not UTF-8.
         let contents = fs::read(&source).unwrap();
         for line in String::from_utf8_lossy(&contents).lines() {
             let code = line.split("//").next().unwrap();
@@ -163,7 +163,7 @@ fn powers_of_sources(about: &Value) -> BTreeSet<&'static str> {
     powers
 }
 
-/// All Rust files of a package but those of its tests, benches and examples.
+/// All Rust files of a package except its tests, benches and examples.
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder)
         .unwrap()
@@ -180,7 +180,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     found.collect()
 }
 
-/// The part of a version that stays while releases are compatible: 4 of 4.6.7, 0.22 of 0.22.1.
+/// The part of a version that is fixed among compatible releases: 4 of 4.6.7, 0.22 of 0.22.1.
 fn compatible(version: &str) -> &str {
     let parts = version.split('.').take_while(|part| *part == "0").count();
     let ends = version.match_indices('.').map(|(end, _)| end);

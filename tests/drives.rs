@@ -15,7 +15,7 @@ use crate::support::catalogue::{assert_near, points};
 use crate::support::clients::client;
 use crate::support::{mechanisms, refuses, succeeds, text};
 
-/// A pendulum arm on two position servos, as it is drawn or as it is built. Friction there hardens in half a millisecond: by
+/// A pendulum arm on two position servos, as drawn or as built. Friction there stiffens within half a millisecond: by
 /// default MuJoCo's acts some ten milliseconds ahead of the velocity.
 fn arm(shoulder: &str, elbow: &str) -> String {
     format!(
@@ -41,7 +41,7 @@ fn arm(shoulder: &str, elbow: &str) -> String {
     )
 }
 
-/// What the report found of an effect on a joint: value and 95 % interval of its first parameter.
+/// The effect that the report found on a joint: value and 95 % interval of its first parameter.
 fn found(report: &Value, name: &str, joint: u64) -> Option<[f64; 3]> {
     let mut effects = report["effects"].as_array()?.iter();
     let effect = effects.find(|e| e["name"] == name && e["joint"] == joint)?;
@@ -57,7 +57,7 @@ fn estimate(parameter: &Value) -> Option<[f64; 3]> {
     ])
 }
 
-/// Whether a value is right within twice its interval.
+/// Whether a value is correct within twice its interval.
 fn holds([value, low, high]: [f64; 3], truth: f64) -> bool {
     (value - truth).abs() <= high - low
 }
@@ -85,7 +85,7 @@ fn a_log_of_commands_needs_a_drive() {
     assert!(said.contains("there is no column \"cmd1\""), "{said}");
 }
 
-/// What a model file says that is wrong in this way.
+/// The error message for a model file with this drive.
 fn message(drive: &str) -> String {
     let library = Library::built_in();
     let text = Library::system_text("servo").unwrap();
@@ -97,7 +97,7 @@ fn message(drive: &str) -> String {
 }
 
 #[test]
-fn faults_of_a_drive_are_told_with_their_place() {
+fn faults_of_a_drive_are_reported_with_their_place() {
     assert!(message("").contains(
         "`tau1` is missing in [drive]; a joint whose command is its torque has tau1 = \"cmd1\""
     ));
@@ -107,7 +107,7 @@ fn faults_of_a_drive_are_told_with_their_place() {
         "{unknown}"
     );
     assert!(message("tau1 = \"cmd1\"\ntau2 = \"cmd1\"").contains("tau2"));
-    // The torque is what comes out.
+    // The torque is the output, not an input.
     assert!(message("tau1 = \"tau1 + cmd1\"").contains("tau1"));
 }
 
@@ -135,7 +135,7 @@ fn ready_drives_are_written_into_models() {
                 .parameters()
                 .all(|[name, ..]| own(&format!("{name}_2")))
         );
-        // An effort limit is part of the drive where that has one.
+        // An effort limit is part of the drive if the drive has one.
         let limits = model
             .effects
             .iter()
@@ -188,7 +188,7 @@ fn effects_of_the_torque_act_behind_the_drive() {
         let inputs = [&[0.0, 0.0, command, 0.0], dynamics.values().as_slice()].concat();
         dynamics.program.eval(&inputs)[1]
     };
-    // 15 N m/rad up to 1.9 N m, on 0.02 kg m^2; twice the torque, not twice the command.
+    // 15 N m/rad up to 1.9 N m, on 0.02 kg m^2: twice the torque, not twice the command.
     assert!((acceleration(&model, 0.1) - 75.0).abs() < 1e-9);
     assert!((acceleration(&model, 9.0) - 95.0).abs() < 1e-9);
     assert!((acceleration(&with, 9.0) - 190.0).abs() < 1e-9);
@@ -244,7 +244,7 @@ hold_s = 0.4
 integrator = "rk4"
 "#;
 
-/// Whoever trains a servo's model and plans with it gives targets, and the log of the episode has them.
+/// Training a servo's model and planning with it uses targets, and the episode's log holds them.
 #[test]
 fn a_servo_is_trained_and_planned_with() {
     let folder = tempfile::tempdir().unwrap();
@@ -325,7 +325,7 @@ mod slow {
             "--out",
             text(&model),
         ]);
-        // The gains of the loops are set, and known.
+        // The gains of the loops are set by the user, and known.
         let declared = fs::read_to_string(&model).unwrap();
         let known = declared.replace(
             "unit = \"N m/rad\", positive = true",
@@ -335,7 +335,7 @@ mod slow {
         fs::write(&model, known).unwrap();
         let report = close_the_loop(&model, &logs[..3], &logs[3], &at("out"));
         assert_eq!(report["verdict"], "explained", "{report:#}");
-        // MuJoCo moves positions by the new velocities: half a step ahead.
+        // MuJoCo updates positions with the new velocities: half a step ahead.
         let truth = [
             ("actuator_delay", 1, 0.014 - 2.5e-5),
             ("actuator_delay", 2, 0.014 - 2.5e-5),
@@ -348,7 +348,7 @@ mod slow {
             let estimate = found(&report, name, joint).unwrap();
             assert!(holds(estimate, value), "{name} {joint}: {estimate:?}");
         }
-        // The rotor of the shoulder is part of the upper arm's inertia.
+        // The shoulder's rotor is part of the upper arm's inertia.
         let inertia = &report["parameters"][0];
         assert_eq!(inertia["name"], "zz_1");
         let estimate = estimate(inertia).unwrap();
@@ -383,7 +383,7 @@ mod slow {
         let text = fs::read_to_string(at("out/report.md")).unwrap();
         assert!(text.contains("under the logged commands"));
         assert!(text.contains("`cmd1(t - d1)`"));
-        // No torque is in the logs, and none can be compared.
+        // The logs hold no torque, so none can be compared.
         assert!(report["torque"].is_null());
         let said = refuses(&[
             "closeloop",

@@ -31,12 +31,12 @@ mass = [["I"]]
 bias = ["G * sin(q1)"]
 "#;
 
-/// What `closeloop` answers, which writes a report that can be read again.
+/// The output of `closeloop`, whose report can be read again.
 fn closed(scratch: &Scratch, arguments: &[&str]) -> String {
     let out = scratch.out();
-    let told = answers(&[&["closeloop", "--budget", "0s", "--out", &out], arguments].concat());
+    let message = answers(&[&["closeloop", "--budget", "0s", "--out", &out], arguments].concat());
     succeeds(&["report", &out]);
-    told
+    message
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn a_network_that_diverges_leaves_the_report_without_one() {
     let failure = json["network"]["failure"].as_str().unwrap();
     says(failure, &["the loss became", "in epoch "]);
     assert_eq!(json["network"]["used"], false);
-    // The network that adds nothing is written in other operations.
+    // The network that adds nothing is evaluated with other operations.
     let error = |model: &str| {
         json["error"][model]["position_rmse"][1][0]
             .as_f64()
@@ -83,7 +83,7 @@ fn logs_of_few_and_far_rows_get_an_answer() {
     let scratch = Scratch::new();
     let torques = scratch.file("torques.toml", PENDULUM_OF_TORQUES);
     let log = scratch.log("log.csv", swinging);
-    // Windows of the fit are shorter than a step of this log.
+    // The fit's windows are shorter than a step of this log.
     let sparse = scratch.log_at(
         "sparse.csv",
         (0..40).map(|row| 0.5 * f64::from(row)),
@@ -95,7 +95,7 @@ fn logs_of_few_and_far_rows_get_an_answer() {
         swinging,
     );
     let out = scratch.out();
-    let told = refuses(&[
+    let message = refuses(&[
         "closeloop",
         "--model",
         "pendulum",
@@ -104,7 +104,7 @@ fn logs_of_few_and_far_rows_get_an_answer() {
         "--out",
         &out,
     ]);
-    says(&told, &["the logs give no window to fit"]);
+    says(&message, &["the logs give no window to fit"]);
     closed(
         &scratch,
         &["--model", "pendulum", "--train", &log, "--test", &sparse],
@@ -148,9 +148,9 @@ fn clocks_that_no_log_has_are_refused_with_their_line() {
         (0..200).map(|row| 1.7e18 + 1e9 * steps(row)),
         swinging,
     );
-    let told = refuses(&["audit", &late]);
+    let message = refuses(&["audit", &late]);
     says(
-        &told,
+        &message,
         &[
             "late.csv, line 2",
             "1.7e18 s is beyond 1e12 s",
@@ -159,9 +159,9 @@ fn clocks_that_no_log_has_are_refused_with_their_line() {
     );
     let pause = |row: u32| steps(row) + if row < 100 { 0.0 } else { 1e9 };
     let paused = scratch.log_at("paused.csv", (0..200).map(pause), swinging);
-    let told = refuses(&["audit", &paused]);
+    let message = refuses(&["audit", &paused]);
     says(
-        &told,
+        &message,
         &[
             "paused.csv, line 102",
             "time jumps by 1",
@@ -169,7 +169,7 @@ fn clocks_that_no_log_has_are_refused_with_their_line() {
             "cut the file there",
         ],
     );
-    // A pause of an hour is none of these.
+    // A pause of an hour is accepted.
     let hour = |row: u32| steps(row) + if row < 100 { 0.0 } else { 3600.0 };
     answers(&[
         "audit",
@@ -182,16 +182,16 @@ fn torques_of_any_size_are_told_in_numbers() {
     let scratch = Scratch::new();
     let torques = scratch.file("torques.toml", PENDULUM_OF_TORQUES);
     let tiny = |time: f64| swinging(time).map(|number| 1e-200 * number);
-    let told = answers(&["audit", &scratch.log("tiny.csv", tiny)]);
-    assert!(!told.contains("NaN"), "{told}");
+    let message = answers(&["audit", &scratch.log("tiny.csv", tiny)]);
+    assert!(!message.contains("NaN"), "{message}");
     let passive = scratch.log("passive.csv", |time| {
         let [q, qd, _] = swinging(time);
         [q, qd, 0.0]
     });
-    let told = succeeds(&[
+    let message = succeeds(&[
         "evaluate", "--model", &torques, "--test", &passive, "--torque",
     ]);
-    says(&told, &["no share, the logged torques are zero"]);
+    says(&message, &["no share, the logged torques are zero"]);
     let logs = ["--train", &passive, "--test", &passive];
     closed(
         &scratch,
@@ -199,16 +199,16 @@ fn torques_of_any_size_are_told_in_numbers() {
     );
     let heavy = PENDULUM_OF_TORQUES.replace("value = 0.3", "value = 1e300");
     let heavy = scratch.file("heavy.toml", heavy);
-    let told = ends_without(&[
+    let message = ends_without(&[
         "evaluate", "--model", &heavy, "--test", &passive, "--torque",
     ]);
-    says(&told, &["the torques that rod needs", "no finite numbers"]);
+    says(&message, &["the torques that rod needs", "are not finite"]);
 }
 
 #[test]
 fn what_the_logs_do_not_determine_has_no_end_in_the_report() {
     let scratch = Scratch::new();
-    // Too few windows to tell two parameters.
+    // Too few windows to determine two parameters.
     let log = scratch.log("log.csv", |time| {
         let [q, qd, _] = swinging(time);
         [q, qd, 1.0]
@@ -225,14 +225,17 @@ fn what_the_logs_do_not_determine_has_no_end_in_the_report() {
 #[test]
 fn formulas_that_are_no_finite_number_are_refused_with_their_place() {
     let scratch = Scratch::new();
-    for (formula, told) in [
+    for (formula, message) in [
         ("1e200 * 1e200 * q1", "this is inf, no finite number"),
         ("log(0) + q1", "this is -inf"),
         ("sqrt(1 - 2) * q1", "this is NaN"),
         ("q1 / (1 - 1)", "this is divided by zero"),
     ] {
         let model = scratch.moving_by("model.toml", formula);
-        says(&refuses(&["check", &model]), &["model.toml, line 11", told]);
+        says(
+            &refuses(&["check", &model]),
+            &["model.toml, line 11", message],
+        );
     }
 }
 
@@ -251,21 +254,21 @@ fn steps_of_any_length_are_exported_or_refused() {
         "export", "--model", &unstable, "--format", "json", "--out", &out,
     ]);
     assert!(output.status.success());
-    let told = String::from_utf8_lossy(&output.stderr);
+    let message = String::from_utf8_lossy(&output.stderr);
     says(
-        &told,
-        &["note: the rollout leaves the finite numbers in step "],
+        &message,
+        &["note: the rollout is no longer finite in step "],
     );
     let output = residyn(&[&usual[..], &["--step", "1e300"]].concat());
     assert_eq!(output.status.code(), Some(1));
-    let told = String::from_utf8_lossy(&output.stdout);
+    let message = String::from_utf8_lossy(&output.stdout);
     says(
-        &told,
+        &message,
         &["the model itself leaves the finite numbers in a step of 1e300 s from the state ["],
     );
     for substeps in ["fine:1001", "fine:4294967295"] {
-        let told = refuses(&[&usual[..], &["--integrator", substeps]].concat());
-        says(&told, &["at most 1000 substeps"]);
+        let message = refuses(&[&usual[..], &["--integrator", substeps]].concat());
+        says(&message, &["at most 1000 substeps"]);
     }
     let delay = "\n[[effect]]\nname = \"actuator_delay\"\njoint = 1\nd = 0.02\n";
     let delayed = scratch.file(
@@ -317,8 +320,8 @@ fn rigs_and_tasks_beyond_any_sensor_are_refused() {
         "penalty = { fixed = { alpha = 1e-4 } }\nintegrator = \"semi_implicit_euler\"",
         "integrator = { fine = { steps = 4294967295 } }",
     );
-    let told = refuses(&["train", "--config", &recipe, "--out", &out]);
-    says(&told, &["at most 1000 substeps"]);
+    let message = refuses(&["train", "--config", &recipe, "--out", &out]);
+    says(&message, &["at most 1000 substeps"]);
     assert!(!Path::new(&out).exists());
 }
 
@@ -359,8 +362,8 @@ fn effects_without_parameters_have_none_to_set() {
         "--effects",
         text(&own),
     ];
-    let told = refuses(&[&usual[..], &["--effect", "push=1"]].concat());
-    says(&told, &["push has no parameter"]);
+    let message = refuses(&[&usual[..], &["--effect", "push=1"]].concat());
+    says(&message, &["push has no parameter"]);
 }
 
 #[test]
@@ -382,18 +385,18 @@ fn rewards_and_plans_that_are_no_finite_numbers_end_control() {
         &control("objective = \"log(q1 - 100)\""),
         &["the objective of the task is NaN in the state at 0.020 s"],
     );
-    // Double precision has these numbers, and the single precision of plans has not.
+    // Double precision can represent these numbers, but the single precision of plans cannot.
     says(
         &control("objective = \"1e300 * (1 + q1^2)\""),
         &[
-            "10 of 10 plan(s) are none",
+            "10 of 10 plan(s) failed",
             "in episode 0 at 0.000 s",
             "no candidate has a finite return",
         ],
     );
 }
 
-/// A mass whose inverse is infinite: what divides by it leaves the finite numbers.
+/// A mass whose inverse is infinite: dividing by it overflows.
 #[test]
 fn a_mass_too_small_for_its_inverse_is_no_mechanism() {
     let scratch = Scratch::new();
@@ -404,8 +407,8 @@ fn a_mass_too_small_for_its_inverse_is_no_mechanism() {
     for format in ["mjcf", "urdf"] {
         let out = text(&scratch.path("light.xml")).to_owned();
         let export = ["export", "--model", &model, "--format", format];
-        let told = refuses(&[&export[..], &["--out", &out]].concat());
-        says(&told, &["too small or too large"]);
+        let message = refuses(&[&export[..], &["--out", &out]].concat());
+        says(&message, &["too small or too large"]);
     }
 }
 
@@ -449,7 +452,7 @@ mod slow {
             ("latex", "model.tex"),
         ] {
             let out = scratch.path(out);
-            // Without a compiler, which would take memory of its own.
+            // Without a compiler, which would need memory as well.
             let output = Command::new("bash")
                 .args(["-c", "ulimit -v 200000; exec \"$0\" \"$@\""])
                 .arg(env!("CARGO_BIN_EXE_residyn"))
@@ -466,8 +469,8 @@ mod slow {
                 .envs([("MALLOC_ARENA_MAX", "1"), ("RAYON_NUM_THREADS", "2")])
                 .output()
                 .unwrap();
-            let told = String::from_utf8_lossy(&output.stderr);
-            assert!(output.status.success(), "{format}: {told}");
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{format}: {message}");
             assert!(fs::metadata(out).unwrap().len() < 2_000_000);
         }
     }

@@ -13,14 +13,14 @@ use crate::support::catalogue::{
 use crate::support::mechanisms::{fixture, read_to};
 use crate::support::oracles::ORACLES;
 
-/// As for the systems: rounding of some dozens of operations.
+/// As for the systems: rounding of a few dozen operations.
 const ROUNDING: f64 = 1e-12;
 
 /// The torque that reaches the equations of motion, from the effect's parameters and q, v, tau of its
 /// joint. Friction levels are positive when they oppose the motion.
 type Meaning = fn(&[f64], f64, f64, f64) -> f64;
 
-/// All effects of the force and of the torque.
+/// All effects of kind force and torque.
 const MEANINGS: [(&str, Meaning); 13] = [
     ("viscous_friction", |p, _, v, tau| tau - p[0] * v),
     ("coulomb_friction", |p, _, v, tau| tau - p[0] * sign(v)),
@@ -36,7 +36,7 @@ const MEANINGS: [(&str, Meaning); 13] = [
         match v {
             v if v > 0.0 => tau - (f_p + b_p * v),
             v if v < 0.0 => tau + (f_n - b_n * v),
-            // Halfway between the two, as a sign of zero says.
+            // Halfway between the two, since the sign of zero is zero.
             _ => tau - 0.5 * (f_p - f_n),
         }
     }),
@@ -66,7 +66,7 @@ fn sign(x: f64) -> f64 {
     f64::from(u8::from(x > 0.0)) - f64::from(u8::from(x < 0.0))
 }
 
-/// Effect parameters about their typical values, by up to a half.
+/// Effect parameters within half of their typical values.
 fn values(effect: &Effect, seed: u64) -> Vec<f64> {
     let mut rng = rng(seed);
     let typical = effect.parameters.iter().map(|p| p.typical);
@@ -140,7 +140,7 @@ fn friction_opposes_the_motion() {
         );
         for (v, tau) in [(1.5, 1.0), (-1.5, 1.0), (0.2, -1.0), (-0.2, -1.0)] {
             let inputs = [&[0.3, v, tau, 0.0], model.values().as_slice()].concat();
-            // The drive has a mass of 1: acceleration less torque is the force of friction.
+            // The drive has a mass of 1: acceleration minus torque is the friction force.
             let friction = model.program.eval(&inputs)[1] - tau;
             assert!(friction * v < 0.0, "{name}: {friction} at speed {v}");
         }
@@ -166,7 +166,7 @@ fn a_tilt_turns_gravity() {
             "pendulum",
         );
     }
-    // In a chain all angles count from the first link's: a tilt there tilts all.
+    // In a chain, all angles count from the first link's: a tilt there tilts every link.
     let acrobot = dynamics(
         &system("acrobot"),
         &[fitted(tilt, 0, &[0.03])],
@@ -183,7 +183,7 @@ fn a_tilt_turns_gravity() {
     }
 }
 
-/// In logged angles: whatever the rig's own angle does, the logged one less the offset does.
+/// In logged angles: the logged angle minus the offset behaves as the rig's true angle.
 #[test]
 fn a_sensor_offset_shifts_the_measured_angle_alone() {
     let library = Library::built_in();
@@ -215,8 +215,8 @@ fn a_sensor_offset_shifts_the_measured_angle_alone() {
     }
 }
 
-/// M(q) qdd = tau - bias: the mass matrix's columns are what unit torques reveal, so that the rotor's
-/// inertia is tested by the torque it would take to turn it.
+/// M(q) qdd = tau - bias: unit torques reveal the mass matrix's columns, so the rotor's inertia is tested by the torque
+/// that would turn it.
 #[test]
 fn a_rotor_adds_to_its_own_joint_alone() {
     let library = Library::built_in();
@@ -232,7 +232,7 @@ fn a_rotor_adds_to_its_own_joint_alone() {
             for point in points(&model, 100, 6) {
                 let found = model.program.eval(&point);
                 let (inertia, bare) = point.split_last().unwrap();
-                // The bare rig, driven by what the rotor leaves of the torque, moves the same way.
+                // The bare rig, driven by the torque that remains after turning the rotor, moves the same way.
                 let mut left = bare.to_vec();
                 left[2 * n + joint] -= inertia * found[n + joint];
                 for (j, wanted) in oracle(&left).into_iter().enumerate() {
@@ -243,8 +243,8 @@ fn a_rotor_adds_to_its_own_joint_alone() {
     }
 }
 
-/// The motor turns with both joints: what its friction and its rotor take of the sum is missing on the first joint, and r times
-/// that on the second.
+/// The motor turns with both joints: the torque of its friction and its rotor is subtracted from the first joint's, and
+/// r times that torque from the second's.
 #[test]
 fn a_coupled_motor_takes_from_both_joints() {
     let library = Library::built_in();
@@ -275,7 +275,7 @@ fn a_coupled_motor_takes_from_both_joints() {
     }
 }
 
-/// A point of a mass m at a place makes the last body another one: by the parallel axis theorem.
+/// A point mass m changes the last body's inertia by the parallel axis theorem.
 #[test]
 fn a_payload_is_part_of_the_last_body() {
     let library = Library::built_in();
@@ -326,14 +326,14 @@ fn torque_effects_come_before_forces_and_in_their_order() {
         let inputs = [&[0.0, 1.0, tau, 0.0], model.values().as_slice()].concat();
         model.program.eval(&inputs)[1]
     };
-    // What is added to the torque is not amplified.
+    // Torque that is added is not amplified.
     assert_near(
         at(&[offset, gain.clone()], 1.0),
         1.5 + 0.3,
         ROUNDING,
         "offset",
     );
-    // The gear sees 1.5 N m of a commanded 1 N m, wherever in the list the friction stands.
+    // The gear sees 1.5 N m for a commanded 1 N m, wherever the friction stands in the list.
     assert_near(
         at(&[load.clone(), gain.clone()], 1.0),
         1.5 - 0.2 * 1.5,
@@ -358,7 +358,8 @@ fn torque_effects_come_before_forces_and_in_their_order() {
 #[test]
 fn every_effect_file_is_tested_here() {
     let mut tested: Vec<&str> = MEANINGS.iter().map(|(name, _)| *name).collect();
-    // Those with memory and those of the sensor are tested in memory.rs, a tilt, a rotor, a coupling, a payload and an offset above.
+    // Effects with memory and effects of the sensor are tested in memory.rs; a tilt, a rotor, a coupling, a payload and
+    // an offset above.
     tested.extend([
         "gravity_tilt",
         "joint_coupling",

@@ -13,7 +13,7 @@ use crate::support::clients::client;
 use crate::support::predictions::{agree, client_agrees, expected, predictions, written};
 use crate::support::{exported_models, refuses, residyn, succeeds, text};
 
-/// The client of descriptions that docs/export.md shows.
+/// The reader of descriptions that docs/export.md shows.
 const DESCRIPTION: PythonClient = PythonClient {
     name: "description.py",
     script: include_str!("../docs/clients/description.py"),
@@ -75,7 +75,7 @@ fn errors_in_imported_files_name_a_remedy() {
         "--out",
         &at("m.json"),
     ]);
-    let told = |change: &dyn Fn(&mut Value)| {
+    let message = |change: &dyn Fn(&mut Value)| {
         let mut json: Value =
             serde_json::from_slice(&std::fs::read(at("m.json")).unwrap()).unwrap();
         change(&mut json);
@@ -88,21 +88,21 @@ fn errors_in_imported_files_name_a_remedy() {
         message.replace(&at(""), "")
     };
     assert_eq!(
-        told(&|json| json["residyn_model"] = json!(2)),
+        message(&|json| json["residyn_model"] = json!(2)),
         "error: n.json has format 2, this program reads 1; use the residyn that wrote it (0.1.0)\n"
     );
-    let missing = told(&|json| json["weights"] = json!("gone.safetensors"));
+    let missing = message(&|json| json["weights"] = json!("gone.safetensors"));
     assert!(
         missing.starts_with("error: gone.safetensors cannot be read: "),
         "{missing}"
     );
-    let other = told(&|json| json["parameters"][0]["name"] = json!("C_h"));
+    let other = message(&|json| json["parameters"][0]["name"] = json!("C_h"));
     assert!(
         other.contains("there is no tensor `parameters.C_h`"),
         "{other}"
     );
     let model =
-        told(&|json| json["model_toml"] = json!("[system]\nname = \"pendulum\"\njoint = 1\n"));
+        message(&|json| json["model_toml"] = json!("[system]\nname = \"pendulum\"\njoint = 1\n"));
     assert!(
         model.contains("unknown key `joint`") && model.contains("line 3"),
         "{model}"
@@ -152,7 +152,7 @@ fn the_folder_of_an_export_is_made() {
     let deep = folder.path().join("made/for/it/m.json");
     assert_eq!(run(&deep).status.code(), Some(0));
     assert!(deep.is_file());
-    // A file stands where a folder would have to be.
+    // A file stands where a folder is needed.
     let nowhere = run(&deep.join("below/m.json"));
     assert_eq!(nowhere.status.code(), Some(2));
     let said = String::from_utf8(nowhere.stderr).unwrap();
@@ -225,7 +225,7 @@ fn a_description_needs_no_effect_files_to_be_read() {
 mod slow {
     use super::*;
 
-    /// What holds for a new format without a test of its own.
+    /// Checks for a new format without a test of its own.
     #[test]
     fn every_format_is_read_by_its_client_and_documented() {
         let pendulum = exported_models::all().swap_remove(0);

@@ -18,7 +18,7 @@ fn flags(text: &str) -> BTreeSet<String> {
     named.filter(|flag| flag.len() > 2).collect()
 }
 
-/// The flags of all commands, without those that every program has.
+/// The flags of all commands, without those of every program.
 fn own_flags() -> BTreeSet<String> {
     let mut own = flags(&succeeds(&["completions", "bash"]));
     for general in ["--help", "--version"] {
@@ -27,7 +27,7 @@ fn own_flags() -> BTreeSet<String> {
     own
 }
 
-/// The Rust files below a folder but for one folder in it.
+/// The Rust files below a folder, except those in one folder.
 fn sources(folder: &Path, but: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -74,14 +74,14 @@ fn the_command_line_says_which_flag_mends_an_error() {
         "--train",
         &long,
     ];
-    let told = refuses(&[&model[..], &["--test", &short]].concat());
+    let message = refuses(&[&model[..], &["--test", &short]].concat());
     says(
-        &told,
+        &message,
         &["the test logs hold no window", "--test names the test logs"],
     );
-    let told = refuses(&[&model[..], &["--errors", "torque"]].concat());
+    let message = refuses(&[&model[..], &["--errors", "torque"]].concat());
     says(
-        &told,
+        &message,
         &[
             "no torques can be compared",
             "--errors motion compares the motion",
@@ -90,8 +90,8 @@ fn the_command_line_says_which_flag_mends_an_error() {
     let branches = r#"<robot name="y"><link name="base"/><link name="a"/><link name="b"/>
 <joint name="ja" type="continuous"><parent link="base"/><child link="a"/></joint>
 <joint name="jb" type="continuous"><parent link="base"/><child link="b"/></joint></robot>"#;
-    let told = refuses(&["new", "--from-urdf", &scratch.file("y.urdf", branches)]);
-    says(&told, &["branches", "--tip names the last body"]);
+    let message = refuses(&["new", "--from-urdf", &scratch.file("y.urdf", branches)]);
+    says(&message, &["branches", "--tip names the last body"]);
     let delay = "\n[[effect]]\nname = \"actuator_delay\"\njoint = 1\nd = 0.02\n";
     let delayed = scratch.model("delayed.toml", "[energy]", &format!("{delay}\n[energy]"));
     let line = [
@@ -99,7 +99,7 @@ fn the_command_line_says_which_flag_mends_an_error() {
     ];
     says(
         &refuses(&line),
-        &["steps of 1e-9 s are remembered", "--step gives it"],
+        &["steps of 1e-9 s are remembered", "set it with --step"],
     );
 }
 
@@ -110,13 +110,13 @@ fn a_finding_is_mended_by_a_flag_on_the_command_line_alone() {
     let times = (0..600).map(|row| 0.01 * f64::from(row) + if row < 300 { 0.0 } else { 0.5 });
     let log = scratch.log_at("gap.csv", times, swinging);
     let output = crate::support::residyn(&["audit", &log]);
-    let told = String::from_utf8(output.stdout).unwrap();
-    assert!(told.contains("paste: --leave-out gap.csv@"), "{told}");
+    let message = String::from_utf8(output.stdout).unwrap();
+    assert!(message.contains("paste: --leave-out gap.csv@"), "{message}");
     let log = read_standard_log(Path::new(&log)).unwrap();
     let audit = residyn_core::data::audit(&log, &residyn_core::data::Columns::default());
-    let told = audit.to_string();
+    let message = audit.to_string();
     assert!(
-        told.contains("leave out gap.csv@") && !told.contains("--"),
-        "{told}"
+        message.contains("leave out gap.csv@") && !message.contains("--"),
+        "{message}"
     );
 }

@@ -50,7 +50,7 @@ fn commands() -> Vec<Vec<String>> {
     all.into_iter().map(owned).collect()
 }
 
-/// A file of rigs beside their logs.
+/// A file of rigs, and their logs.
 fn measured_rigs() -> &'static Bench {
     static RIGS_AND_LOGS: OnceLock<Bench> = OnceLock::new();
     RIGS_AND_LOGS.get_or_init(|| Bench::new(RIGS))
@@ -68,9 +68,9 @@ fn one_at_a_time_works_in_a_folder() {
     let folder = RunFolder::open(&out).unwrap();
     let process = format!("process {},", std::process::id());
     for command in commands() {
-        let told = refuses(&with_out(&command, text(&out)));
+        let message = refuses(&with_out(&command, text(&out)));
         says(
-            &told,
+            &message,
             &[text(&out), &process, "is working there", "with --out"],
         );
     }
@@ -78,7 +78,7 @@ fn one_at_a_time_works_in_a_folder() {
     assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
 }
 
-/// What the program says that can write no file of more than a kilobyte, as on a full disk.
+/// The program's output when it cannot write a file of more than a kilobyte, as on a full disk.
 fn on_a_full_disk(arguments: &[&str]) -> Output {
     Command::new("bash")
         .args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\""])
@@ -88,13 +88,13 @@ fn on_a_full_disk(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Nothing but the error, which names the folder.
+/// Only the error, which names the folder.
 fn is_told(output: &Output, out: &str) {
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{told}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
     let error = format!("error: {out}: cannot be written: ");
-    assert!(told.starts_with(&error), "{told}");
-    says(&told, &["give another folder with --out"]);
+    assert!(message.starts_with(&error), "{message}");
+    says(&message, &["give another folder with --out"]);
 }
 
 #[test]
@@ -109,11 +109,11 @@ fn a_full_disk_is_told_before_the_work() {
     }
 }
 
-/// A run without the rights of the superuser, who may write everywhere.
+/// A run without superuser rights, since the superuser may write everywhere.
 fn without_rights(scratch: &Path, arguments: &[&str]) -> Output {
     let program = scratch.join("residyn");
     if !program.exists() {
-        // By a process of its own: a file that a child of another thread still holds open for writing cannot be started.
+        // In a separate process: a file that a child of another thread still holds open for writing cannot be started.
         let mut copy = Command::new("cp");
         let copied = copy.arg(env!("CARGO_BIN_EXE_residyn")).arg(&program);
         assert!(copied.status().unwrap().success());
@@ -153,10 +153,13 @@ fn a_folder_without_permission_is_told_before_the_work() {
         (closeloop, "open/out", "open/out: cannot be written"),
     ] {
         let output = without_rights(scratch, &[command, &["--out", out]].concat());
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{told}");
-        assert!(told.starts_with(&format!("error: {refusal}: ")), "{told}");
-        says(&told, &["ermission denied", "--out"]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(
+            message.starts_with(&format!("error: {refusal}: ")),
+            "{message}"
+        );
+        says(&message, &["ermission denied", "--out"]);
         assert_eq!(fs::read_dir(scratch.join("mine")).unwrap().count(), 0);
         assert_eq!(fs::read_dir(scratch.join("open")).unwrap().count(), 1);
     }

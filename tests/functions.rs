@@ -18,7 +18,7 @@ const fn case(formula: &'static str, truth: fn(f64, f64) -> [f64; 3]) -> Case {
     Case { formula, truth }
 }
 
-/// x and y lie in 0.3 to 1.4; formulas shift them to where they want them.
+/// x and y lie in 0.3 to 1.4; formulas shift them to the range that they need.
 const CASES: &[Case] = &[
     case("-x", |x, _| [-x, -1.0, 0.0]),
     case("x + y", |x, y| [x + y, 1.0, 1.0]),
@@ -31,7 +31,7 @@ const CASES: &[Case] = &[
     case("atan2(x, y)", |x, y| {
         [(x / y).atan(), y / (x * x + y * y), -x / (x * x + y * y)]
     }),
-    // All four quadrants are seen by signs of the two arguments.
+    // The signs of the two arguments cover all four quadrants.
     case("atan2(-x, -y)", |x, y| {
         let r = x * x + y * y;
         [(x / y).atan() - std::f64::consts::PI, y / r, -x / r]
@@ -182,7 +182,7 @@ fn values_and_slopes_on_tensors() {
             let inputs = [0, 1].map(|k| tensor(&column(&grid(), k), &device).require_grad());
             let value = replay(&value_alone(case.formula), &inputs).swap_remove(0);
             let zeros = || vec![0.0; grid().len()];
-            // What depends on no input has no gradients at all.
+            // An output that depends on no input has no gradients at all.
             let constant = truth.iter().all(|row| row[1..] == [0.0, 0.0]);
             let mut found = [numbers(value.clone()), zeros(), zeros()];
             if !constant || value.is_require_grad() {
@@ -213,7 +213,7 @@ fn a_smooth_sign_is_a_tanh_of_its_width() {
     }
 }
 
-/// What is not a number must be seen at the end, by every reader.
+/// A NaN must reach the output in every reader.
 #[test]
 fn nan_propagates() {
     let nan = f64::NAN;

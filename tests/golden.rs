@@ -1,7 +1,7 @@
 //! Whole answers on fixed logs, beside those that are committed in `tests/golden`: a change that is meant to change no answer
 //! changes none of these.
 //!
-//! `tests/run --bless` writes them anew where a change is meant; the difference is then part of the commit.
+//! `tests/run --bless` rewrites them after an intended change; the difference is then part of the commit.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,9 +13,9 @@ use crate::support::mechanisms::fixture;
 use crate::support::paths::{config, ours};
 use crate::support::{Scratch, answers, measured, succeeds, text};
 
-/// What depends on the machine, the time, the version and the paths; what only draws the numbers beside it; the settings, which
-/// are the same in all; and the errors with a network, which is trained in single precision: between processors with and
-/// without AVX-512 they differ by up to a tenth.
+/// Left out: values that depend on the machine, the time, the version and the paths; values that only draw the numbers;
+/// the settings, which are the same in all answers; and the errors with a network, which is trained in single
+/// precision: between processors with and without AVX-512 they differ by up to a tenth.
 const LEFT_OUT: [&str; 10] = [
     "with",
     "hybrid",
@@ -24,12 +24,12 @@ const LEFT_OUT: [&str; 10] = [
     "configuration",
     "version",
     "files",
-    "shown",
+    "plots",
     "curves",
     "tried",
 ];
 
-/// Close the loop with these arguments, and compare the answer with the one that is committed under a name.
+/// Close the loop with these arguments, and compare the answer with the committed one of this name.
 fn answer_is_as_before(name: &str, arguments: &[&str]) {
     let scratch = Scratch::new();
     let out = scratch.out();
@@ -78,7 +78,7 @@ fn leave_out(value: &mut Value) {
     }
 }
 
-/// JSON of lines that are short enough to be read and long enough to be few.
+/// JSON in lines that are short enough to read and long enough to be few.
 fn lines(value: &Value, depth: usize) -> String {
     let short = value.to_string();
     let (indent, end) = ("  ".repeat(depth + 1), "  ".repeat(depth));
@@ -98,7 +98,7 @@ fn lines(value: &Value, depth: usize) -> String {
     format!("{open}\n{}\n{end}{close}", entries.join(",\n"))
 }
 
-/// Four logs of 6 s of a plant, the last of which is tested on; and the answer on them.
+/// Four logs of 6 s of a plant, the last of which is the test log; and the answer on them.
 fn simulated(name: &str, model: &str, plant: &str, effects: &[&str]) {
     let scratch = Scratch::new();
     let mut simulate = vec!["simulate", "--quiet", "--plant", plant, "--duration", "6"];
@@ -121,7 +121,7 @@ fn small(name: &str) -> String {
     text(&ours("tests/fixtures/logs").join(name)).to_owned()
 }
 
-/// The arm of two links whose log is committed.
+/// The two-link arm whose log is committed.
 fn small_arm_model(scratch: &Scratch) -> String {
     let (urdf, model) = (fixture("planar_2r.urdf"), scratch.path("planar_2r.toml"));
     let from = ["new", "--quiet", "--from-urdf", text(&urdf)];
@@ -129,7 +129,7 @@ fn small_arm_model(scratch: &Scratch) -> String {
     text(&model).to_owned()
 }
 
-/// The answer on a committed log.
+/// The answer for a committed log.
 fn of_small_log(name: &str, log: &str, model: &str) {
     answer_is_as_before(name, &["--model", model, "--train", &small(log)]);
 }
@@ -258,7 +258,7 @@ mod slow {
         answer_is_as_before(name, &arguments);
     }
 
-    /// An arm by its URDF, which lies beside its logs.
+    /// An arm from the URDF that lies next to its logs.
     fn arm(name: &str, train: &[&str], test: &[&str]) {
         let Some(folder) = measured(name) else { return };
         let scratch = Scratch::new();

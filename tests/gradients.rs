@@ -11,7 +11,7 @@ use crate::support::catalogue::{
 };
 use crate::support::tensors::{devices, numbers, tensor};
 
-/// Wide enough that third derivatives of tanh(v / width) leave central differences four digits.
+/// Wide enough that the third derivatives of tanh(v / width) leave four digits to central differences.
 const SIGNS: [SignForm; 2] = [SignForm::Exact, SignForm::Smooth { width: 0.3 }];
 /// f32 keeps 6e-8 of a value; derivatives multiply the accelerations' terms by up to 1 / (mass of the
 /// pole): measured up to 4e-5 of max(1, value), for 12^2 sin(12 q) cogs.
@@ -22,7 +22,7 @@ fn cases() -> impl Iterator<Item = Case> {
     SIGNS.into_iter().flat_map(catalog)
 }
 
-/// The accelerations' differences by input k over 2 h.
+/// The accelerations' central difference by input k over 2 h.
 fn difference(program: &Program, joints: usize, point: &[f64], k: usize, h: f64) -> Vec<f64> {
     let at = |by: f64| {
         let mut point = point.to_vec();
@@ -36,8 +36,8 @@ fn difference(program: &Program, joints: usize, point: &[f64], k: usize, h: f64)
         .collect()
 }
 
-/// Derivatives of fourth order (Richardson), or `None` where a kink lies within reach: there the two
-/// differences disagree by more than their error of order h^2.
+/// Derivatives of fourth order (Richardson), or `None` if a kink is within reach: there the two differences disagree by
+/// more than their error of order h^2.
 fn slope(program: &Program, joints: usize, point: &[f64], k: usize) -> Option<Vec<f64>> {
     let h = 1e-3 * point[k].abs().max(0.1);
     let coarse = difference(program, joints, point, k, h);
@@ -102,7 +102,7 @@ fn burn_differentiates_the_replay_as_we_do() {
     for device in devices() {
         for (k, case) in cases().enumerate() {
             let mut points = points(&case.dynamics, ROWS, k as u64);
-            // Parameters are shared by all rows, as in training: their gradient is the rows' sum.
+            // Parameters are shared by all rows, as in training: their gradient is the sum over the rows.
             let states = 3 * case.dynamics.joints + 1;
             let parameters = points[0][states..].to_vec();
             points
@@ -140,7 +140,7 @@ fn check_burn(case: &Case, points: &[Vec<f64>], joint: usize, device: &Device) {
                 .zip(wanted)
                 .for_each(|(f, w)| assert_near(*f, w, F32, &what));
         } else {
-            // The rounding of a sum is measured against its terms.
+            // The rounding of a sum is measured relative to its terms.
             let size: f64 = wanted.iter().map(|w| w.abs()).sum::<f64>().max(1.0);
             assert_near(
                 found[0] / size,

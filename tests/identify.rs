@@ -14,7 +14,7 @@ use crate::support::logs::{add_noise, simulate};
 /// Windows in s.
 const WINDOW_S: f64 = 0.5;
 
-/// Standard deviation of the angles in rad that fits are told, and that noisy logs have.
+/// Standard deviation of the angles in rad that fits are given, and that noisy logs have.
 const NOISE: f64 = 1e-3;
 
 fn shooting<'l>(logs: &'l [Log], joints: usize) -> Shooting<'l> {
@@ -28,8 +28,8 @@ fn fit_to(
     values: &[f64],
 ) -> (Values, Fit) {
     let start = model.clone().with_values(values.iter().copied());
-    let locals = shooting.initial_locals(0);
-    let (found, fit) = fit(shooting, &start, active, locals, None).unwrap();
+    let start_states = shooting.initial_start_states(0);
+    let (found, fit) = fit(shooting, &start, active, start_states, None).unwrap();
     assert!(fit.termination.has_converged(), "{:?}", fit.termination);
     (found, fit)
 }
@@ -40,7 +40,7 @@ fn free(model: &Dynamics) -> Vec<usize> {
         .collect()
 }
 
-/// The true values with the active ones off by a fifth, up and down in turn.
+/// The true values, with the active ones off by a fifth, alternately up and down.
 fn astray(model: &Dynamics, active: &[usize]) -> Vec<f64> {
     let mut values = model.values();
     for (turn, k) in active.iter().enumerate() {
@@ -61,8 +61,7 @@ fn logs(model: &Dynamics, torque: f64) -> Vec<Log> {
     vec![log(1), log(2)]
 }
 
-/// The steps of the fit's integrator are 2 ms, those of the rig 0.5 ms: they agree to 1e-9, and the
-/// parameters to a multiple of that.
+/// The fit's integrator steps 2 ms, the rig's 0.5 ms: they agree to 1e-9, and the parameters to a multiple of that.
 const RECOVERED: f64 = 1e-6;
 
 fn assert_recovered(model: &Dynamics, logs: &[Log], active: &[usize]) {
@@ -119,8 +118,8 @@ fn names(model: &Dynamics, indices: &[usize]) -> Vec<String> {
         .collect()
 }
 
-/// With `free` parameters of which `determined` combinations are determined, the rest can be held, and
-/// what is not held then comes back.
+/// Of `all` parameters, `determined` combinations are determined: the remaining ones can be held, and the parameters
+/// that are not held are then recovered.
 fn assert_determined(name: &str, all: usize, determined: usize) {
     let model = dynamics(&system(name), &[], SignForm::Exact);
     let logs = logs(&model, 3.0);
@@ -139,8 +138,8 @@ fn assert_determined(name: &str, all: usize, determined: usize) {
     assert_recovered(&model, &logs, &rest);
 }
 
-/// Of the acrobot's masses, lengths and inertias the motion shows I1 + m1 lc1^2 + m2 l1^2, I2 + m2 lc2^2,
-/// m2 l1 lc2, m1 lc1 + m2 l1 and m2 lc2.
+/// Of the acrobot's masses, lengths and inertias the motion determines I1 + m1 lc1^2 + m2 l1^2, I2 + m2 lc2^2, m2 l1
+/// lc2, m1 lc1 + m2 l1 and m2 lc2.
 #[test]
 fn five_combinations_of_the_acrobots_seven_are_determined() {
     assert_determined("acrobot", 7, 5);
@@ -165,7 +164,7 @@ fn without_torque_its_gain_is_undetermined_and_held() {
         .map(|(name, _)| name.as_str())
         .collect();
     assert_eq!(parts, ["C_i"]);
-    // A flat direction stays where it is, and spoils nothing.
+    // A flat direction stays at its start value, and does not affect the others.
     let shooting = shooting(&logs, 1);
     let start = [astray(&model, &[0])[0], 2.4];
     let (found, _) = fit_to(&shooting, &model, &[0, 1], &start);
@@ -173,7 +172,7 @@ fn without_torque_its_gain_is_undetermined_and_held() {
     assert_eq!(found.common[1], 2.4);
 }
 
-/// Whether the interval of each parameter holds the truth, and the fit's scale of the residuals.
+/// Whether each parameter's interval holds the truth, and the fit's scale of the residuals.
 fn covered(model: &Dynamics, clean: &Log, seed: u64) -> (Vec<bool>, f64) {
     let mut log = clean.clone();
     add_noise(&mut log, NOISE, seed);
@@ -193,26 +192,26 @@ fn intervals_have_their_nominal_coverage() {
     let library = Library::built_in();
     let friction = fitted(library.effect("viscous_friction").unwrap(), 0, &[0.05]);
     let model = dynamics(&system("pendulum"), &[friction], SignForm::Exact);
-    // Hanging at first, and never near upright.
+    // It hangs at first, and never comes near upright.
     let clean = simulate(&model, &[3.0, 0.0], 1.0, 2000, 5);
     let all: Vec<(Vec<bool>, f64)> = (0..SEEDS as u64)
         .map(|seed| covered(&model, &clean, 100 + seed))
         .collect();
     for (k, parameter) in model.parameters.iter().enumerate() {
         let hits = all.iter().filter(|(holds, _)| holds[k]).count();
-        // Binomial: 57 expected, deviation sqrt(60 * 0.95 * 0.05) = 1.7. Fewer than 53 (88 %) come about
-        // with a chance of 1 %; the seeds are fixed, so that the test does not flicker.
+        // Binomial: 57 expected, deviation sqrt(60 * 0.95 * 0.05) = 1.7. Fewer than 53 (88 %) occur with a probability
+        // of 1 %; the seeds are fixed, so that the test does not flicker.
         assert!(hits >= 53, "{}: {hits} of {SEEDS}", parameter.name);
     }
-    // An interval that always holds the truth is too wide: 180 of 180 has a chance of 1e-4.
+    // An interval that always holds the truth is too wide: 180 of 180 has a probability of 1e-4.
     assert!(all.iter().flat_map(|(holds, _)| holds).any(|holds| !holds));
-    // The noise is recognised: 2000 residuals give its scale to 1.4826 * 1.17 / sqrt(2000), 4 %, each;
-    // free start states absorb some of it.
+    // The noise level is recovered: 2000 residuals give its scale to 1.4826 * 1.17 / sqrt(2000), 4 %, each; free start
+    // states absorb some of it.
     let mean = all.iter().map(|(_, scale)| scale).sum::<f64>() / SEEDS as f64;
     assert!((mean - 1.0).abs() < 0.05, "{mean}");
 }
 
-/// Three logs of one rig, the zero of its sensor taken anew for each.
+/// Three logs of one rig, each with another sensor zero.
 const OFFSETS: [f64; 3] = [0.03, -0.02, 0.04];
 
 fn offset_logs(model: &Dynamics, seed: u64) -> Vec<Log> {
@@ -250,10 +249,10 @@ fn offsets_are_recovered_per_log_with_nominal_coverage() {
             );
             hits.push((found.get(*column) - truth[i]).abs() <= uncertainty.half_width(i));
         }
-        // The intervals of the offsets are worth having.
+        // The intervals of the offsets are narrow enough to be useful.
         assert!((2..5).all(|i| uncertainty.half_width(i) < 3e-3));
     }
-    // Binomial: 190 of 200 expected, deviation 3.1; 182 come about with a chance of 1 %.
+    // Binomial: 190 of 200 expected, deviation 3.1; 182 occur with a probability of 1 %.
     let held = hits.iter().filter(|hit| **hit).count();
     assert!((182..200).contains(&held), "{held} of {}", hits.len());
 }
@@ -321,7 +320,7 @@ fn check_window(log: &Log, window: &Window, length_s: f64) {
         .iter()
         .any(|out| out.start_s <= end && out.end_s >= start);
     assert!(!out, "{window:?} touches what is left out");
-    // Its last row is the last before its nominal end, give or take half a step.
+    // Its last row is the last one before its nominal end, within half a step.
     assert!(
         (end - start - length_s).abs() < 0.0155,
         "{window:?} is {} s long",
@@ -350,7 +349,7 @@ fn windows_of_an_unbroken_log_leave_no_row_between_them() {
     let model = dynamics(&system("pendulum"), &[], SignForm::Exact);
     let logs = [simulate(&model, &[1.0, 0.0], 1.0, 1000, 1)];
     let windows = cut(&logs, WINDOW_S);
-    // 10 s less the 40 ms that the state's estimate needs at the start.
+    // 10 s less the 40 ms that the state estimate needs at the start.
     assert_eq!(windows.len(), 19);
     assert_eq!(windows[0].first, 4);
     assert!(windows.windows(2).all(|pair| pair[0].last == pair[1].first));

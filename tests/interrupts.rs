@@ -20,9 +20,9 @@ fn begin(arguments: &[&str]) -> Child {
         .unwrap()
 }
 
-/// Type Ctrl-C; the exit status and what the run said.
+/// Send Ctrl-C; return the exit status and the run's output.
 fn interrupt(run: Child) -> (Option<i32>, String) {
-    // Between the lock of its folder and the handler are some microseconds.
+    // The lock of its folder precedes the handler by some microseconds.
     sleep(Duration::from_millis(200));
     let pid = run.id().to_string();
     let sent = Command::new("kill").args(["-INT", &pid]).status().unwrap();
@@ -74,14 +74,14 @@ fn a_training_says_what_is_kept_and_how_to_go_on() {
     assert_eq!(typed, format!("residyn {}", command.join(" ")));
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
     assert_eq!(left.len(), 2, "recipe and checkpoint: {left:?}");
-    // What is typed goes on from what was kept.
+    // The same command continues from what was kept.
     let mut again = begin(&command);
     let mut said = String::new();
     let mut errors = BufReader::new(again.stderr.take().unwrap());
     errors.read_line(&mut said).unwrap();
     again.kill().unwrap();
     again.wait().unwrap();
-    assert!(said.contains("goes on from epoch "), "{said}");
+    assert!(said.contains("resumes from epoch "), "{said}");
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn a_run_that_counts_says_how_far_it_came() {
     let (status, said) = interrupt(run);
     assert_eq!(status, Some(130), "{said}");
     assert!(
-        said.contains(" rounds; to go on from there, type again\n  residyn mbrl"),
+        said.contains(" rounds; to resume from there, run again\n  residyn mbrl"),
         "{said}"
     );
     assert!(!folder.path().join(".run.lock").exists());

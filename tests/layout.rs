@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::support::paths::ours;
 
-/// The sources in a folder of tests and those below it, but for what they share.
+/// The sources in a folder of tests and below it, except the shared ones.
 fn sources(folder: &Path, found: &mut Vec<(String, String)>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

@@ -132,7 +132,7 @@ mod slow {
         }
     }
 
-    /// Cut anywhere, and each with a bit flipped: read, or refused.
+    /// Cut anywhere, and each with a bit flipped: read or refused.
     #[test]
     fn damaged_files_are_no_panic() {
         let Some(folder) = formats() else { return };

@@ -51,7 +51,7 @@ fn recorded(name: &str, seed: u64) -> Log {
     log
 }
 
-/// A folder with the log of the rig, changed, and the model of its declared values.
+/// A folder with the rig's log, changed, and the model with its declared values.
 struct Desk {
     folder: tempfile::TempDir,
 }
@@ -81,14 +81,14 @@ impl Desk {
         path
     }
 
-    /// What comes of closing the loop on the log.
+    /// The result of closing the loop on the log.
     fn closed<T>(&self, run: impl Fn(&[&str]) -> T) -> T {
         let (log, out) = (self.path("run.csv"), self.path("out"));
         let rig = ["--model", "pendulum", "--train", &log, "--out", &out];
         run(&[["closeloop", "--json"].as_slice(), &rig].concat())
     }
 
-    /// The findings of this severity of `residyn audit`, whose exit status must say whether some are serious.
+    /// The findings of this severity from `residyn audit`, whose exit status must say whether some are serious.
     fn findings(&self, severity: &str, model: Option<&str>) -> Vec<Value> {
         let log = self.path("run.csv");
         let model = model.map_or(vec![], |model| vec!["--model", model]);
@@ -103,7 +103,7 @@ impl Desk {
     }
 }
 
-/// What can be pasted: `remedy` of all findings under one key.
+/// Lines to paste: `remedy` of all findings under one key.
 fn remedies(findings: &[Value], key: &str) -> Vec<String> {
     let of_one = |finding: &Value| finding["remedy"][key].as_array().cloned();
     let mut lines: Vec<String> = findings
@@ -124,7 +124,7 @@ fn within_turn(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 
-/// What a logger does to a log, and words of the finding that names it.
+/// What a logger does to a log, and words of the finding that names the fault.
 type Case = (fn(&mut Log), &'static str);
 
 const MISREAD: [Case; 14] = [
@@ -205,7 +205,7 @@ fn what_is_misread_is_named_and_mended_by_the_lines_to_paste() {
     }
 }
 
-/// What is mended is the log as it was meant.
+/// The corrected log is the intended one.
 #[test]
 fn pasted_lines_give_back_the_log() {
     let desk = Desk::with(|log| {
@@ -273,7 +273,7 @@ fn a_reading_that_jumps_is_placed_and_can_be_left_out() {
     assert!(with > 1.0 && without < 0.3, "{with} {without}");
 }
 
-/// A fit of the rig's equations to logs as fits read them, and what it leaves.
+/// A fit of the rig's equations to logs as fits read them, and its unexplained residual.
 fn left(logs: &[Log], model: &Model) -> (Fitted, Unexplained) {
     let settings = Settings::default();
     let logs: Vec<Log> = logs.iter().map(|log| log.for_fits(0.5)).collect();
@@ -306,7 +306,7 @@ fn single_readings_that_jump_are_masked_in_fits() {
     );
 }
 
-/// The log without every row for which it says so.
+/// The log without the rows that `dropped` selects.
 fn thinned(log: &Log, dropped: impl Fn(usize) -> bool) -> Log {
     let rows: Vec<usize> = (0..log.rows()).filter(|row| !dropped(*row)).collect();
     let of = |values: &Vec<f64>| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
@@ -337,12 +337,12 @@ fn dropped_rows_leave_nothing_unexplained() {
         friction(&found),
         friction(&whole)
     );
-    // What does not act is still seen.
+    // A missing effect is still seen.
     let (_, something) = left(&thin, &rig().declared());
     assert!(something.is_significant(), "{something:?}");
 }
 
-/// Closing the loop with a library in which nothing can be found.
+/// Closing the loop with an empty library, so that nothing can be found.
 fn closed(model: &Model, train: Vec<Log>, test: Vec<Log>) -> Outcome {
     let library = Library::empty();
     let request = Request::new(model, &library, Split::given(train, test));
@@ -350,9 +350,9 @@ fn closed(model: &Model, train: Vec<Log>, test: Vec<Log>) -> Outcome {
 }
 
 #[test]
-fn a_push_by_hand_is_told_with_its_range() {
+fn a_push_by_hand_is_reported_with_its_range() {
     let mut pushed = recorded("pushed.csv", 1);
-    // A force that no column holds.
+    // A force that is in no column.
     pushed.tau[0][500..540]
         .iter_mut()
         .for_each(|tau| *tau -= 3.0);
@@ -387,7 +387,7 @@ fn a_push_by_hand_is_told_with_its_range() {
 fn a_rig_at_rest_is_inconclusive() {
     let still: [fn(usize) -> f64; 2] = [
         |_| 0.3,
-        // An encoder between two of its steps.
+        // An encoder that flickers between two steps.
         |row| 0.3 + 1.5e-3 * f64::from(u8::from((row * 7919) % 10 == 0)),
     ];
     for angle in still {
@@ -412,7 +412,7 @@ fn a_rig_at_rest_is_inconclusive() {
     }
 }
 
-/// The horizons of the report on one log of this length, without test logs, and those that it does not give.
+/// The horizons of the report for one log of this length, without test logs, and those that it omits.
 fn horizons(duration_s: f64) -> [Vec<f64>; 2] {
     let mut plant = rig();
     plant.recording.duration_s = duration_s;
@@ -465,7 +465,7 @@ fn serious_findings_stand_before_the_answer() {
     let words = Words::default();
     let printed = summary(&report, &outcome.seconds, Path::new("report"), &[], &words);
     assert!(
-        printed.starts_with("Serious, to be mended first: opposite.csv: "),
+        printed.starts_with("Serious, to be fixed first: opposite.csv: "),
         "{printed}"
     );
     let whole = printed.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -543,7 +543,7 @@ mod slow {
             let mut log = simulate(&case.dynamics, &start, 3.0, 1500, seed);
             log.path = case.name.clone().into();
             let runs_away = log.q.iter().flatten().any(|q| !(q.abs() < 1e3));
-            // No spring is wound up over turns: what looks like one is an angle in degrees.
+            // No spring winds up over turns: an apparent one is an angle in degrees.
             let turns = log.q.iter().flatten().any(|q| q.abs() > TAU);
             let is_wound = turns && case.name.contains("joint_spring");
             if !runs_away && !is_wound {

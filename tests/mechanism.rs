@@ -80,7 +80,7 @@ fn the_mass_matrix_is_symmetric_and_positive() {
     }
 }
 
-/// No change of one parameter can be compensated by the others: the derivatives of the torques are independent.
+/// A change of one parameter cannot be compensated by the others: the derivatives of the torques are independent.
 #[test]
 fn base_parameters_are_linearly_independent() {
     for name in FILES {
@@ -101,7 +101,7 @@ fn base_parameters_are_linearly_independent() {
                     model.program.eval(&point)[n..].to_vec()
                 };
                 let slopes: Vec<f64> = (at(1.0).iter().zip(at(-1.0))).map(|(a, b)| a - b).collect();
-                // In torques, which parameters enter as they are.
+                // In torques, which are linear in the parameters.
                 let mass = inverse_mass(&model, state).try_inverse().unwrap();
                 (mass * nalgebra::DVector::from_vec(slopes))
                     .iter()
@@ -186,7 +186,7 @@ fn new_writes_a_model_file_that_other_commands_read() {
     succeeds(&["evaluate", "--model", text(&out), "--test", text(&log)]);
 }
 
-/// The message of the command for a fixture with one change.
+/// The command's message for a fixture with one change.
 fn message(name: &str, from: &str, to: &str) -> String {
     let contents = fs::read_to_string(fixture(name)).unwrap();
     assert!(contents.contains(from), "{name} has no {from}");

@@ -25,7 +25,7 @@ fn effect(name: &str, value: f64) -> FittedEffect {
     fitted(Library::built_in().effect(name).unwrap(), 0, &[value])
 }
 
-/// A mass of 1 with these filters: acceleration is torque.
+/// A mass of 1 with these filters: acceleration equals torque.
 fn drive(effects: &[FittedEffect]) -> Dynamics {
     dynamics(&system("drive"), effects, SignForm::Exact)
 }
@@ -41,7 +41,7 @@ fn history() -> (Vec<f64>, Vec<f64>) {
     (time, tau)
 }
 
-/// Mean torque of the first joint over each part, and its slopes by the filters' parameters.
+/// Mean torque of the first joint over each part, and its slopes with respect to the filters' parameters.
 fn means(model: &Dynamics, from: f64, to: f64, parts: usize) -> (Vec<f64>, Vec<f64>) {
     let (time, tau) = history();
     let tau = [tau];
@@ -52,7 +52,7 @@ fn means(model: &Dynamics, from: f64, to: f64, parts: usize) -> (Vec<f64>, Vec<f
     (first(torque.mean), first(torque.slopes))
 }
 
-/// The filtered torque by steps of 1 us, averaged over each part.
+/// The filtered torque in steps of 1 us, averaged over each part.
 fn stepped(delay: f64, lag: f64, from: f64, to: f64, parts: usize) -> Vec<f64> {
     let (time, tau) = history();
     let held = |t: f64| tau[time.partition_point(|row| *row <= t).max(1) - 1];
@@ -97,7 +97,7 @@ fn mean_torques_match_those_of_fine_steps() {
         ] {
             let found = means(&model, from, to, parts).0;
             for (found, wanted) in found.iter().zip(stepped(delay, lag, from, to, parts)) {
-                // Jumps of up to 4 N m fall within steps of 1 us of parts of 2 ms and more.
+                // Jumps of up to 4 N m fall within steps of 1 us, in parts of 2 ms and more.
                 assert_near(*found, wanted, 4e-3, &format!("{delay} {lag} {from}"));
             }
         }
@@ -128,7 +128,7 @@ fn slopes_are_those_of_the_mean_torque() {
         let at = |delay: f64, lag: f64| {
             drive(&[effect("actuator_delay", delay), effect("actuator_lag", lag)])
         };
-        // One row ends within the parts, and the step begins where another does.
+        // One row ends within the parts, and the step begins at another.
         let (time, _) = history();
         let (from, to) = (time[4], time[5] + 0.002);
         let mean = |delay, lag| means(&at(delay, lag), from, to, 4).0;
@@ -141,7 +141,7 @@ fn slopes_are_those_of_the_mean_torque() {
         {
             for part in 0..4 {
                 let wanted = (moved[part] - now[part]) / step;
-                // The slopes are up to 4 N m / 3 ms, and bend over the step by step / lag or less.
+                // The slopes are up to 4 N m / 3 ms, and change over the step by step / lag at most.
                 let what = format!("filter {k}, part {part} at {delay}, {lag}");
                 assert!(
                     (slopes[2 * part + k] - wanted).abs() < 0.02 * wanted.abs().max(1.0),
@@ -175,8 +175,8 @@ fn fitted_delay_and_lag_lie_within_their_intervals() {
         let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
         let model = pendulum(&[effect(name, 0.0)]);
         let start = model.with_values([14.0, 3.3, 0.0]);
-        let locals = shooting.initial_locals(0);
-        let (found, fit) = fit(&shooting, &start, &[0, 1, 2], locals, None).unwrap();
+        let start_states = shooting.initial_start_states(0);
+        let (found, fit) = fit(&shooting, &start, &[0, 1, 2], start_states, None).unwrap();
         let uncertainty = uncertainty(&shooting, &fit);
         for (i, wanted) in [15.0, 3.0, truth].into_iter().enumerate() {
             let (value, half) = (found.common[i], uncertainty.half_width(i));
@@ -185,7 +185,7 @@ fn fitted_delay_and_lag_lie_within_their_intervals() {
                 "{name}: {value} +- {half}, wanted {wanted}"
             );
         }
-        // 3000 rows of 1 mrad tell a time to a fraction of a millisecond.
+        // 3000 rows of 1 mrad determine a time to a fraction of a millisecond.
         assert!(
             uncertainty.half_width(2) < 1e-3,
             "{name}: {}",
@@ -238,7 +238,7 @@ fn independent_transitions_are_refused_for_a_rig_with_delay() {
     );
 }
 
-/// An effect file with this in place of the delay's line.
+/// The error message for an effect file with this in place of the delay's line.
 fn refused(from: &str, to: &str) -> String {
     let delay = include_str!("../models/effects/actuator_delay.toml");
     assert!(delay.contains(from));
@@ -273,11 +273,11 @@ fn an_invalid_filter_is_refused_with_its_line() {
 
 #[test]
 fn expressions_of_filters_state_what_they_do_to_the_command() {
-    let told =
+    let message =
         |name: &str, own: &str| effect(name, 0.01).expression(&[own.to_owned()], Quantity::Torque);
-    assert_eq!(told("actuator_delay", "d1"), "tau1(t - d1)");
+    assert_eq!(message("actuator_delay", "d1"), "tau1(t - d1)");
     assert_eq!(
-        told("actuator_lag", "T1"),
+        message("actuator_lag", "T1"),
         "T1 * d(tau1)/dt + tau1 = commanded"
     );
 }
@@ -306,7 +306,7 @@ fn play_separates_the_measured_angle_from_the_links() {
         state[0][0] = shown;
         sensors.correct(&mut state, || vec![Row([tau])], Row([0.0]));
         assert_near(state[0][0], 0.7, 1e-12, "angle of the link");
-        // The link itself moves as without play.
+        // The link itself moves as it would without play.
         let inputs = [&[0.7, v, tau, 0.0], model.values().as_slice()].concat();
         assert_near(
             model.program.eval(&inputs)[1],
@@ -338,8 +338,8 @@ fn fitted_play_lies_within_its_interval() {
         let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
         let model = pendulum(&[backlash(0.0, driven)]);
         let start = model.with_values([14.0, 3.3, 0.0, driven]);
-        let locals = shooting.initial_locals(0);
-        let (found, fit) = fit(&shooting, &start, &[0, 1, 2], locals, None).unwrap();
+        let start_states = shooting.initial_start_states(0);
+        let (found, fit) = fit(&shooting, &start, &[0, 1, 2], start_states, None).unwrap();
         let half = uncertainty(&shooting, &fit).half_width(2);
         let value = found.common[2];
         assert!(
@@ -349,7 +349,7 @@ fn fitted_play_lies_within_its_interval() {
     }
 }
 
-/// Rows from each row whose angle is more than 1 mrad off to the nearest reversal of the motion.
+/// For each row whose angle is off by more than 1 mrad, the rows to the nearest reversal of the motion.
 fn distances(log: &Log, truth: &Log) -> Vec<usize> {
     let turns = truth.qd[0].windows(2).enumerate();
     let reversals: Vec<usize> = turns
@@ -370,7 +370,7 @@ fn the_rigs_own_angles_are_found_behind_play() {
         assert!(distances(&shown, &truth).len() > 1300);
         let own = with_own_angles(&model, &shown);
         let left = distances(&own, &truth);
-        // The torque is logged; a reversal of the motion is seen through velocities over 8 rows on either side.
+        // The torque is logged; reversals of the motion are detected from velocities over 8 rows on either side.
         let reach = if driven > 0.0 { None } else { Some(8) };
         assert!(left.iter().max().copied() <= reach, "{driven}: {left:?}");
     }
@@ -402,22 +402,22 @@ mod slow {
             let end = |k: usize| parameter["ci95"][k].as_f64().unwrap();
             assert!(end(0) < truth && truth < end(1), "{parameter}");
 
-            // What was written predicts the same when it is read again.
+            // The written model predicts the same when it is read again.
             let error = |model: &[&str]| evaluated(model, test);
-            let told = |which: &str| {
+            let message = |which: &str| {
                 report["error"][which]["position_rmse"][1][0]
                     .as_f64()
                     .unwrap()
             };
             let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
             assert_near(
-                error(&["--model", text(&model)]) / told("after"),
+                error(&["--model", text(&model)]) / message("after"),
                 1.0,
                 1e-9,
                 name,
             );
             let read = error(&["--checkpoint", text(&checkpoint)]);
-            assert_near(read / told("hybrid"), 1.0, 1e-4, name);
+            assert_near(read / message("hybrid"), 1.0, 1e-4, name);
         }
     }
 }

@@ -14,11 +14,11 @@ use crate::support::oracles::{ORACLES, Oracle};
 
 /// Halving the integrator's step may change a number by 0.1 %; the rest is rounding.
 const SHARE: f64 = 1e-3;
-/// Rounded decimals: a row that is meant to stand at an edge does.
+/// Rounded decimals: a row that is meant to be at an edge counts as being there.
 const SLACK_S: f64 = 1e-9;
 const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
 
-/// What the definition asks for at one horizon, one number a joint.
+/// The quantities of the definition at one horizon, one number per joint.
 struct Naive {
     position_rmse: Vec<f64>,
     position_median: Vec<f64>,
@@ -71,7 +71,7 @@ fn estimate(log: &Log, joint: usize, row: usize) -> [f64; 2] {
     [c[0], c[1] / w]
 }
 
-/// One held step of at most 0.1 ms at a time, by the classical Runge-Kutta method.
+/// Held steps of at most 0.1 ms, by the classical Runge-Kutta method.
 fn advance(oracle: Oracle, state: &mut [f64], tau: &[f64], values: &[f64], dt: f64) {
     let n = tau.len();
     let rates = |state: &[f64]| {
@@ -159,7 +159,7 @@ fn naive(oracle: Oracle, values: &[f64], logs: &[Log], horizon: f64) -> Naive {
     }
 }
 
-/// A log of the same motion as if read by a noisy rig at irregular times: some rows are left away.
+/// A log of the same motion as if read by a noisy rig at irregular times: some rows are dropped.
 fn worn(mut log: Log, seed: u64) -> Log {
     let mut rng = rng(seed);
     let kept: Vec<usize> = (0..log.rows())
@@ -225,7 +225,7 @@ fn the_error_is_what_its_definition_says() {
     for (name, oracle) in ORACLES {
         let model = dynamics(&system(name), &[], SignForm::Exact);
         let logs = logs(&model);
-        // A model that is wrong by a tenth.
+        // A model that is off by a tenth.
         let values: Vec<f64> = model.values().iter().map(|value| 0.9 * value).collect();
         let (found, summary) = score(&model, &values, &logs, &HORIZONS_S);
         for (k, horizon) in HORIZONS_S.into_iter().enumerate() {
@@ -260,7 +260,7 @@ fn start_times(model: &Dynamics, log: &Log, horizon: f64) -> Vec<f64> {
 #[test]
 fn windows_start_every_half_horizon_from_the_first_row_with_enough_before_it() {
     let model = dynamics(&system("drive"), &[], SignForm::Exact);
-    // At 100 Hz four steps, 40 ms, are the half width.
+    // At 100 Hz the half width is four steps, 40 ms.
     let log = simulate(&model, &[0.0, 0.0], 1.0, 200, 1);
     assert_eq!(start_times(&model, &log, 0.8), [0.04, 0.44, 0.84]);
     // At 1 kHz it is 16 ms.
@@ -287,7 +287,7 @@ fn a_window_that_touches_what_is_left_out_is_dropped() {
         .filter(|t| t + 0.4 < 1.43 || *t > 1.66)
         .collect();
     assert_eq!(start_times(&model, &log, 0.4), left);
-    // From the window that reaches 10 ms into it to the one that starts 20 ms before its end.
+    // From the window that overlaps its start by 10 ms to the one that starts 20 ms before its end.
     assert_eq!(left.len(), 9);
 }
 
@@ -304,7 +304,7 @@ fn a_window_that_diverges_counts() {
     assert_eq!(wild.windows, calm.windows);
     assert_eq!(wild.diverged, [0, wild.windows[1]]);
     assert_eq!(calm.diverged, [0, 0]);
-    // Beyond what any motion is, and still a number.
+    // Larger than any real motion, and still finite.
     assert!(wild.position_rmse[1][0] > 100.0 && wild.position_rmse[1][0].is_finite());
 }
 
@@ -319,7 +319,7 @@ fn shifted(model: &Dynamics, start: &[f64], offset: f64, seed: u64) -> Log {
 fn calibration_finds_each_logs_offset_and_scores_the_rest() {
     let model = dynamics(&system("pendulum"), &[], SignForm::Exact);
     let values = model.values();
-    // Logged angle = true angle + offset, another one in each log.
+    // Logged angle = true angle + offset, which differs from log to log.
     let offsets = [0.05, -0.08];
     let mut logs = vec![
         shifted(&model, &[1.0, 0.0], offsets[0], 1),
@@ -352,7 +352,7 @@ fn calibration_wants_a_share_between_none_and_all() {
     for share in [0.0, 1.0, -0.5, f64::NAN] {
         assert!(calibrate(&model, &mut logs, share).is_err());
     }
-    // 100 ms hold no window.
+    // 100 ms are too short for a window.
     assert!(calibrate(&model, &mut logs, 0.02).is_err());
     assert_eq!(logs, untouched);
 }

@@ -5,8 +5,8 @@ use residyn_core::expr::SignForm;
 use crate::support::catalogue::{assert_near, dynamics, points, system};
 use crate::support::oracles::{COMMANDED, ORACLES};
 
-/// Rounding only: both sides take some dozens of operations in f64 (1e-16 each), of which a subtraction
-/// in the acrobot's denominator may lose two digits.
+/// Rounding only: both sides take a few dozen operations in f64 (1e-16 each), and a subtraction in the acrobot's
+/// denominator may lose two digits.
 const ROUNDING: f64 = 1e-12;
 
 #[test]

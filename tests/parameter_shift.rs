@@ -30,7 +30,7 @@ bias = ["m*g*l*sin(q1) + b*qd1"]
 
 const TRUE_M: f64 = 1.2;
 
-/// The arm as it is.
+/// The arm as built.
 const RIG: &str = "model = \"arm.toml\"\nparameters = { m = 1.2 }\n\
     sensor = { rate_hz = 100, position_noise = 1e-3, position_step = 0 }\n\
     excitation = { amplitude = [4.0], band_hz = [0.15, 2.0], tones = 8 }\n\
@@ -49,7 +49,7 @@ fn fixed_parameters_but_gravity_can_be_shifted() {
         .iter()
         .map(|shift| (shift.effect.parameters[0].name.clone(), shift.joint.index()))
         .collect();
-    // The first link moves with the first joint alone; whatever else there is turns with the second.
+    // The first link moves with the first joint only; all other bodies turn with the second.
     let wanted = [
         ("m1", 0),
         ("m2", 1),
@@ -72,7 +72,7 @@ fn a_shift_equals_a_file_with_the_shifted_value() {
         SignForm::Exact,
     );
     let mut shift = arm.shifts().remove(0);
-    // What is positive stays positive.
+    // A positive parameter stays positive.
     assert!(shift.effect.parameters[0].bounds[0] > -1.0);
     assert!(shift.effect.parameters[0].bounds[0] < -0.99);
     shift.values[0].0 = 0.25;
@@ -84,7 +84,7 @@ fn a_shift_equals_a_file_with_the_shifted_value() {
         point.push(0.25);
         assert_near(shifted.program.eval(&point)[1], wanted, 1e-12, "arm");
     }
-    // Two parameters of one joint may be shifted, one of them not twice.
+    // Two parameters of one joint may be shifted, but not one of them twice.
     let other = arm.shifts().remove(1);
     assert!(arm.check_effect(&other, &[shift.clone()]).is_ok());
     assert!(arm.check_effect(&shift, &[other, shift.clone()]).is_err());
@@ -135,7 +135,8 @@ mod slow {
             "{parameter}"
         );
         assert!(high - low < 0.01, "{parameter}");
-        // The written model has it in its place, and predicts the same, as does the checkpoint's.
+        // The written model holds the shifted value in the parameter's place, and predicts the same, as does the
+        // checkpoint's.
         let written = read_model(out.join("model.toml"), &Library::built_in()).unwrap();
         assert!(written.effects.is_empty());
         assert_eq!(written.parameters[0].value, number(&parameter["value"]));

@@ -10,8 +10,8 @@ use crate::support::tensors::{devices, numbers, tensor};
 /// f32 keeps 24 bits, 6e-8 of a value. The accelerations here are sums of terms up to some tens whose
 /// angles (up to 12 q) are rounded as well: measured up to 5e-6 of max(1, value).
 const F32: f64 = 1e-5;
-/// Lanes of a register round products and sums together, and find sines to two units in the last place: measured up
-/// to 3e-14 of max(1, value).
+/// Vector lanes round a product and a sum together, and compute sines to two units in the last place: measured up to
+/// 3e-14 of max(1, value).
 const F64: f64 = 1e-13;
 const ROWS: usize = 48;
 
@@ -69,10 +69,10 @@ fn burn_replays_the_program() {
 fn burn_replays_inputs_that_all_rows_share() {
     for device in devices() {
         for (name, program, points) in cases() {
-            // Every third input is shared by all rows, from a different one on in each case.
+            // Every third input is shared by all rows, starting from a different one in each case.
             let shared = |k: usize| (k + name.len()).is_multiple_of(3);
             check_shared(&name, &program, &points, &device, shared);
-            // All are shared but the first, as parameters and a constant torque are.
+            // All inputs but the first are shared, as parameters and a constant torque are.
             check_shared(&name, &program, &points, &device, |k| k > 0);
         }
     }
@@ -130,7 +130,7 @@ fn compare(name: &str, program: &Program, points: &[Vec<f64>], found: &[Vec<f64>
 
 #[test]
 fn the_catalog_covers_every_system_and_effect() {
-    // 6 systems and 8 joints; 29 shapes (21 effects that are not of chains alone, 7 probes, a user's own) on each joint, but
-    // no tilt on a second joint, no rotor in the pendulum, and a coupling in the acrobot alone.
+    // 6 systems and 8 joints; 29 shapes (21 effects that are not for chains alone, 7 probes, one user effect) on each
+    // joint, but no tilt on a second joint, no rotor in the pendulum, and a coupling only in the acrobot.
     assert_eq!(catalog(SignForm::Exact).len(), 6 + 8 * 29 - 2 - 1 - 7);
 }

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::support::{succeeds, text};
 
-/// Zeros of the training logs in rad, then that of the test log.
+/// Sensor zeros of the training logs in rad, then the test log's.
 const OFFSETS: [f64; 4] = [0.03, -0.02, 0.04, 0.01];
 
 /// A hanging pendulum, 15 s a log, noise of 1 mrad.
@@ -19,7 +19,7 @@ const RIG: &str = "model = \"pendulum\"\nparameters = { C_g = -17.4, C_i = 4.6 }
     excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }\n\
     recording = { logs = 1, duration_s = 15, start = [0, 0] }\n";
 
-/// Logs of the rig, each with an effect of its own.
+/// Logs of the rig, each with its own effect.
 fn record(folder: &Path, effect: impl Fn(usize) -> String) -> Vec<PathBuf> {
     let plant = folder.join("rig.toml");
     std::fs::write(&plant, RIG).unwrap();
@@ -74,7 +74,7 @@ fn zeros_that_differ_between_logs_are_a_sensor_offset() {
         let number = |value: &Value| value.as_f64().unwrap();
         let ci = [0, 1].map(|end| number(&parameter["ci95"][end]));
         assert!(ci[0] < number(&parameter["value"]) && number(&parameter["value"]) < ci[1]);
-        // Twice the interval holds the truth but once in ten thousand times.
+        // Twice the interval misses the truth only once in ten thousand times.
         let reach = ci[1] - ci[0];
         assert!(
             (number(&parameter["value"]) - OFFSETS[k]).abs() < reach,
@@ -95,10 +95,10 @@ fn zeros_that_differ_between_logs_are_a_sensor_offset() {
         let value: Value = serde_json::from_str(&json).unwrap();
         value["position_rmse"][2][0].as_f64().unwrap()
     };
-    // What the test log's zero costs is gone where its first second tells it.
+    // The error due to the test log's zero disappears when its first second determines the zero.
     let rmse = |model: &str| report["error"][model]["position_rmse"][2][0].as_f64();
     assert!(rmse("zeroed").unwrap() < rmse("after").unwrap());
-    // The file keeps what is known of single logs, and says nothing of others.
+    // The file keeps the values of the training logs, and says nothing about other logs.
     let found = std::fs::read_to_string(&model).unwrap();
     assert!(found.contains("q_z = { value = 0.0, logs = { \"run0.csv\" = { value = 0.0"));
     let elsewhere = folder.path().join("elsewhere.csv");

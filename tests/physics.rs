@@ -60,12 +60,12 @@ fn energy_changes_by_the_power_at_every_point() {
     }
 }
 
-/// Hold of the torque in s.
+/// Time for which a torque is held, in s.
 const HOLD_S: f64 = 0.02;
-/// Integration steps in a hold: 0.1 ms, whose error of order 4 is below rounding.
+/// Integration steps per hold: 0.1 ms, whose fourth-order error is below rounding.
 const STEPS: usize = 200;
 
-/// Change of energy less work in J over 5 s from rest near zero, under torques of up to 3 N m.
+/// Change of energy minus work in J over 5 s from rest near zero, under torques of up to 3 N m.
 fn imbalance(system: &Model) -> f64 {
     let balanced = Balanced::new(system);
     let n = system.joints;
@@ -81,7 +81,7 @@ fn imbalance(system: &Model) -> f64 {
             .map(|j| Row([3.0 * (2.0 * time + 1.5 * j as f64).sin()]))
             .collect();
         for _ in 0..STEPS {
-            // Simpson's rule on both ends and the middle: of order 4 like the motion.
+            // Simpson's rule on both ends and the middle: of order 4, as is the motion.
             let before = balanced.energy(&state, &tau)[1];
             stepper.advance(&mut state, &tau, Row([time]), Row([h / 2.0]), 1);
             let middle = balanced.energy(&state, &tau)[1];
@@ -96,7 +96,7 @@ fn imbalance(system: &Model) -> f64 {
 #[test]
 fn energy_minus_work_is_constant_over_five_seconds() {
     for mut system in all_systems() {
-        // Where a drive meets its limit, Simpson's rule is of first order.
+        // At a drive's limit, Simpson's rule is of first order.
         let limits = system.parameters.iter_mut().filter(|p| p.name == "limit");
         limits.for_each(|limit| limit.value = 1e9);
         let off = imbalance(&system);
@@ -111,7 +111,7 @@ fn the_acrobot_as_printed_violates_the_energy_balance() {
     let text = include_str!("fixtures/acrobot_as_printed.toml");
     let printed = Model::from_text(Path::new("acrobot_as_printed.toml"), text, &[]).unwrap();
     let off = imbalance(&printed);
-    // Measured 3.2 J of a motion between -15 and 21 J; other torques lose other amounts.
+    // Measured 3.2 J for a motion between -15 and 21 J; other torques dissipate other amounts.
     assert!(off.abs() > 1.0, "{off} J");
 }
 
@@ -126,7 +126,7 @@ fn swung(scheme: &'static Scheme, steps: usize) -> [f64; 2] {
 
 #[test]
 fn each_scheme_converges_with_its_order() {
-    // At 2^-12 s the error of order 4 is 2^-20 of that at 2^-7 s: as good as none.
+    // The fourth-order error at 2^-12 s is 2^-20 of that at 2^-7 s: negligible.
     let truth = swung(RK4, 4096);
     for scheme in SCHEMES {
         let error = |steps| {
@@ -136,7 +136,7 @@ fn each_scheme_converges_with_its_order() {
         for steps in [64, 128] {
             let order = (error(steps) / error(2 * steps)).log2();
             let off = order - f64::from(scheme.order);
-            // The error's next term is of relative order h, a few percent here.
+            // The next term of the error is of relative order h, a few percent here.
             assert!(
                 off.abs() < 0.2,
                 "{} has order {order} at {steps} steps",
@@ -185,7 +185,7 @@ fn lanes_with_different_steps_are_independent() {
 
 #[test]
 fn rollouts_pass_the_time_to_the_equations() {
-    // qdd = t from rest: v = t^2 / 2, q = t^3 / 6, which a method of order 4 finds exactly.
+    // qdd = t from rest: v = t^2 / 2, q = t^3 / 6, which a fourth-order method integrates exactly.
     let text = "[system]\nname = \"clock\"\njoints = 1\n[dynamics]\nqdd1 = \"t\"\n";
     let clock = Model::from_text(Path::new("clock.toml"), text, &[]).unwrap();
     let model = dynamics(&clock, &[], SignForm::Exact);

@@ -3,7 +3,7 @@
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use residyn::read_log;
-use residyn_core::closeloop::{Outcome, Request, Settings, Space, Split, Verdict, close_loop};
+use residyn_core::closeloop::{ErrorModel, Outcome, Request, Settings, Split, Verdict, close_loop};
 use residyn_core::data::{Log, Smooth};
 use residyn_core::model::{FittedEffect, Library, Model, Origin};
 use residyn_core::sim::Integrator;
@@ -24,7 +24,7 @@ fn declared() -> Model {
     model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")))
 }
 
-/// The arm as it is: bodies that are off by a tenth to a quarter, and effects on some joints, each of these values.
+/// The arm as built: bodies off by 10 to 25 %, and effects with these values on some joints.
 fn rig(effects: &[(usize, &str, &[f64])]) -> Model {
     let library = Library::built_in();
     let of = |(joint, name, values): &(usize, &str, &[f64])| {
@@ -32,7 +32,7 @@ fn rig(effects: &[(usize, &str, &[f64])]) -> Model {
     };
     let mut rig = declared()
         .with_effects(effects.iter().map(of).collect())
-        .with_sign_widths(vec![0.02; 4]);
+        .with_smoothing_velocities(vec![0.02; 4]);
     for (k, body) in rig.inertias().into_iter().enumerate() {
         let factor = [1.2, 0.85, 1.15, 0.9, 1.25][k];
         for parameter in body {
@@ -61,17 +61,17 @@ fn recorded(rig: &Model, seconds: f64, seed: u64) -> Log {
     log
 }
 
-fn closed(rig: &Model, space: Option<Space>) -> Outcome {
+fn closed(rig: &Model, error_model: Option<ErrorModel>) -> Outcome {
     let [train, test] = [(30.0, 1), (10.0, 2)].map(|(seconds, seed)| recorded(rig, seconds, seed));
-    closed_on([train, test], space)
+    closed_on([train, test], error_model)
 }
 
-fn closed_on([train, test]: [Log; 2], space: Option<Space>) -> Outcome {
+fn closed_on([train, test]: [Log; 2], error_model: Option<ErrorModel>) -> Outcome {
     let (declared, library) = (declared(), Library::built_in());
     let split = Split::given(vec![train], vec![test]);
     let mut request = Request::new(&declared, &library, split);
     request.settings = Settings::default();
-    request.space = space;
+    request.error_model = error_model;
     close_loop(request, &mut rng(0), &()).unwrap()
 }
 
@@ -95,7 +95,7 @@ fn is_told(outcome: &Outcome, what: &str) -> bool {
     findings.any(|finding| finding.text.contains(what))
 }
 
-/// Whether an audit says that a log's torques hold another gravity.
+/// Whether an audit says that a log's torques imply another gravity.
 fn contradicts_gravity(outcome: &Outcome) -> bool {
     is_told(outcome, "of the gravity that the declared bodies need")
 }
@@ -116,8 +116,8 @@ fn part(log: &Log, start_s: f64, end_s: f64) -> Log {
     }
 }
 
-/// A measured arm from its URDF, by logs of which a part is set apart. The errors asked for are below those that least squares
-/// reach on base parameters with Stribeck and square-root friction (figures of the READMEs of the data sets).
+/// A measured arm from its URDF, with part of its logs set apart. The required errors are below those of least squares
+/// on base parameters with Stribeck and square-root friction (figures in the READMEs of the data sets).
 fn of_measured(arm: &str, logs: [&str; 2], share: f64, most_percent: f64) -> Option<Outcome> {
     let data = measured(arm)?;
     let declared = described(&read_to(&data.join(format!("{arm}.urdf")), None));
@@ -133,14 +133,14 @@ fn of_measured(arm: &str, logs: [&str; 2], share: f64, most_percent: f64) -> Opt
     let library = Library::built_in();
     let request = Request::new(&declared, &library, Split::given(vec![train], vec![test]));
     let outcome = close_loop(request, &mut rng(0), &()).unwrap();
-    assert_eq!(outcome.space, Space::Torque);
+    assert_eq!(outcome.error_model, ErrorModel::InverseDynamics);
     assert!(!contradicts_gravity(&outcome), "{arm}");
     let percent = 100.0 * outcome.errors.torque.as_ref().unwrap().after.relative;
     assert!(percent <= most_percent, "{arm}: {percent} %");
     Some(outcome)
 }
 
-/// What MuJoCo has words for.
+/// Effects that MuJoCo can express.
 const CARRIED: [&str; 5] = [
     "coulomb_friction",
     "viscous_friction",
@@ -149,7 +149,7 @@ const CARRIED: [&str; 5] = [
     "actuator_gain",
 ];
 
-/// The model in MuJoCo needs the torques of a log as well as it does here.
+/// MuJoCo's model needs a log's torques as accurately as the model here.
 fn mujoco_follows(model: &Model, arm: &str, log: &str) {
     let is_carried = |e: &&FittedEffect| CARRIED.contains(&e.effect.name.as_str());
     let carried: Vec<FittedEffect> = model.effects.iter().filter(is_carried).cloned().collect();
@@ -169,8 +169,8 @@ fn mujoco_follows(model: &Model, arm: &str, log: &str) {
         "{lost:?}"
     );
     mjcf.write(&exported, &written).unwrap();
-    let told = json!({ "q": q, "qd": qd, "qdd": qdd, "tau": tau, "relative": error.relative });
-    std::fs::write(&motion, told.to_string()).unwrap();
+    let message = json!({ "q": q, "qd": qd, "qdd": qdd, "tau": tau, "relative": error.relative });
+    std::fs::write(&motion, message.to_string()).unwrap();
     client("torques.py", &[&written, &motion]);
 }
 
@@ -213,7 +213,7 @@ mod slow {
             (3, "constant_torque", &[0.3]),
         ];
         let outcome = closed(&rig(&hidden), None);
-        assert_eq!(outcome.space, Space::Torque);
+        assert_eq!(outcome.error_model, ErrorModel::InverseDynamics);
         let wanted: Vec<(usize, String)> = (hidden.iter())
             .map(|(joint, name, _)| (*joint, (*name).to_owned()))
             .collect();
@@ -231,7 +231,7 @@ mod slow {
 
     #[test]
     fn an_arm_that_is_as_declared_but_for_its_bodies_lacks_no_effect() {
-        let outcome = closed(&rig(&[]), Some(Space::Torque));
+        let outcome = closed(&rig(&[]), Some(ErrorModel::InverseDynamics));
         assert_eq!(named(&outcome), []);
         assert_eq!(
             outcome.verdict,
@@ -242,12 +242,12 @@ mod slow {
     }
 
     #[test]
-    fn torques_without_gravity_are_told() {
+    fn torques_without_gravity_are_reported() {
         let rig = rig(&[(0, "viscous_friction", &[0.8])]);
         let logs = [(20.0, 1), (10.0, 2)].map(|(seconds, seed)| recorded(&rig, seconds, seed));
         assert!(!contradicts_gravity(&closed_on(
             logs.clone(),
-            Some(Space::Torque)
+            Some(ErrorModel::InverseDynamics)
         )));
         let balance = rig.torque_balance().unwrap();
         let (values, zero) = (balance.values(), vec![0.0; rig.joints]);
@@ -262,7 +262,7 @@ mod slow {
             }
             log
         });
-        let outcome = closed_on(bare, Some(Space::Torque));
+        let outcome = closed_on(bare, Some(ErrorModel::InverseDynamics));
         assert!(contradicts_gravity(&outcome));
         assert_eq!(outcome.verdict, Verdict::Inconclusive, "{}", outcome.reason);
         assert_eq!(named(&outcome), []);
@@ -275,7 +275,7 @@ mod slow {
             return;
         };
         // 7n - 6 for n joints that turn about axes in general position, the first along gravity (Mayeda et al., IEEE T-RA 1990).
-        assert_eq!(outcome.models.bodies.tellable, 43);
+        assert_eq!(outcome.models.bodies.identifiable_at_most, 43);
         mujoco_follows(&outcome.models.after.model, "panda", log);
     }
 
@@ -289,8 +289,8 @@ mod slow {
             &outcome,
             "the motion is that of measurements_1.csv once more"
         ));
-        let told = report::text(&Report::new(&outcome, &Origin::of_seed(0)));
-        assert!(told.contains("The motion of measurements_2.csv is that of another log once more"));
+        let message = report::text(&Report::new(&outcome, &Origin::of_seed(0)));
+        assert!(message.contains("The motion of measurements_2.csv repeats that of another log"));
     }
 
     #[test]
@@ -305,6 +305,6 @@ mod slow {
             named(&outcome)
         );
         let bodies = &outcome.models.bodies;
-        assert!(bodies.tellable == 36 && bodies.told.len() < 36);
+        assert!(bodies.identifiable_at_most == 36 && bodies.identifiable.len() < 36);
     }
 }

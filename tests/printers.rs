@@ -12,7 +12,7 @@ use crate::support::catalogue::{
 
 const SIGNS: [SignForm; 2] = [SignForm::Exact, SignForm::Smooth { width: 0.05 }];
 
-/// The lines `name = formula` of a text as a program of the same inputs.
+/// The lines `name = formula` of a text as a program with the same inputs.
 fn read_back(text: &str, inputs: &[String], outputs: &[String]) -> Program {
     let mut graph = Graph::new();
     let mut scope = Scope::new(SignForm::Exact);
@@ -41,7 +41,7 @@ fn check_text(name: &str, program: &Program, points: &[Vec<f64>]) {
     let again = read_back(&program.text(&borrowed), program.inputs(), &outputs);
     for point in points {
         for (found, wanted) in again.eval(point).iter().zip(program.eval(point)) {
-            // The same operations in the same order: no rounding apart from that of folded constants.
+            // The same operations in the same order: no rounding except that of folded constants.
             assert_near(*found, wanted, 1e-14, name);
         }
     }
@@ -88,7 +88,7 @@ fn formulas_with_every_intermediate_written_out_read_back() {
     }
 }
 
-/// Precedence, signs and associativity where they are easy to get wrong.
+/// Precedence, signs and associativity in cases that are easy to get wrong.
 #[test]
 fn awkward_formulas_read_back_and_are_balanced_in_latex() {
     let inputs = ["x", "y", "z"].map(str::to_owned);
@@ -168,7 +168,7 @@ fn latex_is_balanced() {
         let latex = latex(&case.dynamics);
         check_latex(&case.name, &latex);
         for line in latex.split(" \\\\\n") {
-            // One alignment mark a line; those within cases belong to the cases.
+            // One alignment mark per line; marks within cases belong to the cases.
             let own = line.matches(" &= ").count();
             assert_eq!(own, 1, "{}: {line}", case.name);
         }
@@ -180,7 +180,7 @@ fn an_effects_expression_names_its_joint_and_reads_back() {
     let library = Library::built_in();
     for system in all_systems() {
         for effect in library.effects() {
-            // What a filter does is told in words of its own, see memory.rs.
+            // A filter is described in its own words, see memory.rs.
             if effect.entry.formula().is_none() {
                 continue;
             }

@@ -8,7 +8,7 @@ use residyn_core::model::Library;
 
 use crate::support::catalogue::{assert_near, dynamics};
 
-/// The file, then points: states and torques, and the accelerations there.
+/// The file, then points: states and torques, and the accelerations at each.
 type Case = (&'static str, &'static [(&'static [f64], &'static [f64])]);
 
 const CASES: [Case; 3] = [

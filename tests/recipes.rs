@@ -9,7 +9,7 @@ use residyn_train::{Backend, Checkpoint};
 use crate::support::in_folder::{json, refused};
 use crate::support::paths::configs;
 
-/// Recipes and plants; the demo's plant is part of the program, which reads it in its own tests.
+/// Recipes and plants; the demo's plant is part of the program, whose own tests read it.
 #[test]
 fn every_shipped_recipe_and_plant_can_be_read() {
     let library = Library::built_in();
@@ -106,14 +106,14 @@ fn bad_recipes_are_refused_with_place_and_remedy() {
     assert_eq!(left.len(), 1, "nothing is left behind: {left:?}");
 }
 
-/// Dry friction that reverses over another speed is another model: what the model file says of it holds in training and
-/// tuning as it does in evaluation.
+/// Dry friction with another smoothing velocity is another model: the model file's value holds in training and tuning
+/// as it does in evaluation.
 #[test]
 fn a_model_is_trained_and_tuned_with_its_own_smoothing_of_friction() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let pendulum = Library::system_text("pendulum").unwrap();
-    let text = pendulum.replace("joints = 1", "joints = 1\nsign_width = [0.3]")
+    let text = pendulum.replace("joints = 1", "joints = 1\nsmoothing_velocity = [0.3]")
         + "\n[[effect]]\nname = \"coulomb_friction\"\njoint = 1\nF_c = 0.2\n";
     std::fs::write(dir.join("model.toml"), text).unwrap();
     let recipe = "model = \"model.toml\"\nkind = \"physics\"\n[data]\nplant = \"pendulum\"\ntrajectories = 4\n\
@@ -121,7 +121,7 @@ fn a_model_is_trained_and_tuned_with_its_own_smoothing_of_friction() {
     std::fs::write(dir.join("recipe.toml"), recipe).unwrap();
     let library = Library::built_in();
     let model = read_model(dir.join("model.toml"), &library).unwrap();
-    assert_eq!(model.sign_widths(), [0.3]);
+    assert_eq!(model.smoothing_velocities(), [0.3]);
     let wanted = model.dynamics().program;
     let has_program = |job: Job| job.model.to_dynamics().unwrap().program == wanted;
     let recipe = Recipe::read(&dir.join("recipe.toml")).unwrap();

@@ -50,7 +50,7 @@ fn rig() -> Rig {
 }
 
 impl Rig {
-    /// `closeloop` of the pendulum on these logs, beside other models.
+    /// `closeloop` of the pendulum on these logs, compared with other models.
     fn command<'a>(&'a self, out: &'a Path, against: &[&'a str]) -> Vec<&'a str> {
         let [first, second] = &self.train;
         let logs = [
@@ -79,7 +79,7 @@ fn models_are_scored_as_they_are_on_the_same_windows() {
     assert_eq!(pendulum["name"], "pendulum");
     assert_eq!(true_rig["name"], text(&rig.true_rig));
     assert_eq!(pendulum["windows"], error["before"]["windows"]);
-    // The declared model before any fit is the same model, and `evaluate` scores it alike.
+    // The declared model before any fit is this model, and `evaluate` gives it the same score.
     let evaluated = succeeds(&[
         "evaluate",
         "--json",
@@ -181,7 +181,7 @@ mod slow {
             written.contains(line) && written.contains("): 0.50 times as large"),
             "{written}"
         );
-        // Whoever has the files finds out whether they are those that were read.
+        // The inputs let a reader check that the files are the ones that were read.
         let files = report["call"]["inputs"].as_array().unwrap().iter();
         let roles: Vec<&str> = files.map(|file| file["role"].as_str().unwrap()).collect();
         assert_eq!(roles, ["model", "train", "train", "test"]);

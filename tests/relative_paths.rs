@@ -11,7 +11,7 @@ use residyn_train::recipe::{Job, Recipe};
 
 use crate::support::text;
 
-/// A copy of a configuration in a folder that holds nothing else.
+/// A copy of a configuration in an otherwise empty folder.
 struct Copy {
     folder: tempfile::TempDir,
     file: PathBuf,
@@ -26,7 +26,7 @@ fn copy(configuration: &str) -> Copy {
 }
 
 impl Copy {
-    /// Run the program in an empty folder; what it writes goes beside the copy.
+    /// Run the program in an empty folder; its output goes next to the copy.
     fn runs(&self, command: &[&str], more: &[&str]) {
         let empty = tempfile::tempdir().unwrap();
         let out = self.folder.path().join("out");
@@ -86,7 +86,7 @@ fn all_recipes_and_experiments_name_what_is_built_in() {
         let recipe = Recipe::read(&copy(&recipe).file).unwrap();
         Job::train(recipe, &library, Backend::default(), 0).unwrap();
     }
-    // Those of `offline-prior` begin with checkpoints, which are files of the project.
+    // The recipes of `offline-prior` start from checkpoints, which are files of the project.
     let experiments = [named("physics-prior"), named("receding-horizon")].concat();
     assert!(experiments.len() >= 6, "{experiments:?}");
     for experiment in experiments {

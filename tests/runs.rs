@@ -26,11 +26,11 @@ fn a_second_run_in_a_folder_is_refused_and_harms_nothing() {
     until_there(&dir.join("c/checkpoint.json"), &mut first);
     for again in [&command[..], &["closeloop", "--out", "./c"]] {
         let message = refused(dir, again);
-        let told = format!(
+        let expected = format!(
             "c: another run, process {}, is working there; wait until",
             first.id()
         );
-        assert!(message.contains(&told), "{message}");
+        assert!(message.contains(&expected), "{message}");
         assert!(message.contains("--out"), "{message}");
     }
     let ended = first.wait_with_output().unwrap();
@@ -41,8 +41,8 @@ fn a_second_run_in_a_folder_is_refused_and_harms_nothing() {
     assert_eq!(left, 1, "only the checkpoint is left");
 }
 
-/// Carry out a command, remove what it wrote, carry out the command that `command` finds in the file `record`, and
-/// compare the records without what is no result.
+/// Run a command, remove its output, run the command that `command` finds in the file `record`, and compare the records
+/// without the keys in `clock`.
 fn comes_again(arguments: &[&str], record: &str, command: fn(&Value) -> &Value, clock: &[&str]) {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
@@ -154,7 +154,7 @@ mod slow {
     #[test]
     fn a_report_is_written_where_all_its_files_have_a_place_and_else_none_is() {
         let folder = tempfile::tempdir().unwrap();
-        // In a folder they are read in any order, so each name is tried.
+        // The files of a folder are read in any order, so each name is tried.
         for taken in ["report.json", "model.toml", "errors.svg"] {
             let out = folder.path().join(taken);
             fs::create_dir_all(out.join(taken)).unwrap();

@@ -109,7 +109,7 @@ fn contradictory_sweeps_are_refused_with_a_remedy() {
     let range = ["--seeds", "2", "--alpha", "1e-6-1e-2"];
     let cases: [(&str, &[&str], &str); 8] = [
         (&smoke, &["--seeds", "0"], "--seeds"),
-        (&smoke, &["--seeds", "2", "--alpha", "2-1"], "exchange them"),
+        (&smoke, &["--seeds", "2", "--alpha", "2-1"], "swap them"),
         (&smoke, &["--seeds", "2", "--alpha", "2"], "LOW-HIGH"),
         (&smoke, &["--seeds", "1", "--alpha", "1-2"], "raise --seeds"),
         (&smoke, &["--seeds", "2", "--one-seed"], "--alpha"),

@@ -36,23 +36,23 @@ fn the_answer_fits_a_terminal_for_a_pendulum_and_for_an_arm() {
         "What is missing?\n  coulomb_friction on joint 1: -F_c1 * sign(qd1)\n    F_c1 = 0.1",
         "How much better is it? Open-loop errors on the test logs, rad\n",
         "as written     fitted  with effects\n  joint 1, 0.1 s ahead",
-        "May I trust it?\n",
+        "Can I trust it?\n",
         "What next? ",
-        "report.html; model and plots are beside it\n",
+        "report.html; model and plots are next to it\n",
     ] {
         assert!(said.contains(words), "{words} is missing in\n{said}");
     }
     assert!(BLOCKS.iter().all(|block| said.contains(*block)), "{said}");
     let report: Value =
         serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
-    for compared in ["motion", "torque"] {
+    for compared in ["output_error", "inverse_dynamics"] {
         let value = arm(report.clone(), compared);
         let drawn = vec![String::from("  a curve"); 3];
         let of = |value: Value| {
             let report: Report = serde_json::from_value(value).unwrap();
             let said = summary(&report, &[], Path::new("report"), &drawn, &Words::default());
             is_narrow(&said);
-            // What is said in sentences is never cut.
+            // Sentences are never cut.
             assert!(!said.contains(".."), "{said}");
             said
         };
@@ -75,15 +75,15 @@ fn the_answer_fits_a_terminal_for_a_pendulum_and_for_an_arm() {
         let held = held().join(", ");
         is_whole(
             &said,
-            format!("held, since the logs do not tell them: {held}"),
+            format!("held, since the logs do not determine them: {held}"),
         );
         assert!(
-            said.starts_with("Serious, to be mended first (and 1 more"),
+            said.starts_with("Serious, to be fixed first (and 1 more"),
             "{said}"
         );
         assert!(said.contains("and 5 more effects in report.md"), "{said}");
         let last = match compared {
-            "motion" => "and 3 more joints in report.md",
+            "output_error" => "and 3 more joints in report.md",
             _ => "joint 7 (wrist_flange_joint)",
         };
         assert!(said.contains(last), "{said}");
@@ -94,7 +94,7 @@ fn the_answer_fits_a_terminal_for_a_pendulum_and_for_an_arm() {
 
 const LONG: &str = "a reason that goes on and on ";
 
-/// Parameters that the logs do not tell.
+/// Parameters that the logs do not determine.
 fn held() -> Vec<String> {
     (1..=30).map(|k| format!("m_{k}")).collect()
 }

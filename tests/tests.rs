@@ -1,12 +1,12 @@
 //! One binary for all integration tests: Burn is linked once.
 //!
-//! A test that computes for more than a few seconds, needs other programs than a shell, or kills what it starts stands in a
-//! module called `slow`: in the folder of that name, or at the end of the file of its subject. `tests/run --quick` leaves
-//! these out, by their paths alone, and is told of a test that needs another program by its failure.
+//! A test that computes for more than a few seconds, needs other programs than a shell, or kills processes that it
+//! starts belongs in a module called `slow`: in the folder of that name, or at the end of its subject's file.
+//! `tests/run --quick` skips these modules by their paths; a test elsewhere that needs another program fails there.
 
 // In tests a panic is the message.
 #![allow(clippy::unwrap_used)]
-// And what goes on for ever is seen.
+// A method that never ends is noticed.
 #![allow(clippy::disallowed_methods)]
 
 mod arms;

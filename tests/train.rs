@@ -13,7 +13,7 @@ use serde_json::Value;
 use crate::support::in_folder::{json, kill_after, refused, residyn, run};
 use crate::support::paths::{config, configs};
 
-/// A recipe carried out in this process.
+/// A recipe run in this process.
 fn train(recipe: Recipe, backend: Backend) -> TrainingResults {
     let job = Job::train(recipe, &Library::built_in(), backend, 0).unwrap();
     let dir = tempfile::tempdir().unwrap();
@@ -30,7 +30,7 @@ fn recipe(name: &str) -> Recipe {
     Recipe::read(&configs().join(name)).unwrap()
 }
 
-/// How far the worst parameter is from the truth, as a share of it.
+/// The relative error of the worst parameter.
 fn worst(outcome: &TrainingResults) -> f64 {
     let off = |p: &residyn_train::recipe::FittedParameter| {
         let truth = p.truth.unwrap();
@@ -46,14 +46,14 @@ fn a_checkpoint_of_another_run_is_not_overwritten() {
     let config = config("smoke/train-pendulum.toml");
     let command = ["train", "--config", &config, "--out", "pendulum"];
     let first = json(dir, &command);
-    // The same again is over at once, although the folder now has the name of a built-in system.
+    // The same command again returns at once, although the folder now has the name of a built-in system.
     assert_eq!(json(dir, &command), first);
     let before = std::fs::read(dir.join("pendulum/weights.safetensors")).unwrap();
     let message = refused(dir, &[command.as_slice(), &["--seed", "7"]].concat());
     assert_eq!(
         message,
         "error: pendulum holds another run: its `seed` is 0, here it is 7; give another \
-         folder with --out, or remove this one to start anew\n"
+         folder with --out, or remove this one to start over\n"
     );
     let text = std::fs::read_to_string(&config).unwrap();
     let longer = text.replace("epochs = 200", "epochs = 300");
@@ -96,7 +96,7 @@ fn tuning_fits_a_simulated_prior_to_the_real_plant() {
     let error = |when: &str| outcome["test_error"][when].as_f64().unwrap();
     assert!(error("after") < 0.5 * error("before"), "{outcome}");
     assert_eq!(json(dir, &command), outcome);
-    // The prior is left as it is, and cannot be written over by what came of it.
+    // The prior is left as it is, and the result cannot overwrite it.
     let own = [
         "tune",
         "--checkpoint",
@@ -191,7 +191,7 @@ fn the_published_settings_recover_the_pendulum_parameters() {
     );
 }
 
-/// Seed 0 of train-pendulum.toml, errors being means of ||s' - s_hat'||^2. The friction -0.5 qd has the norm
+/// Seed 0 of train-pendulum.toml; errors are means of ||s' - s_hat'||^2. The friction -0.5 qd has the norm
 /// 0.5 * 8 / sqrt(3) = 2.3.
 ///
 /// | alpha | C_g    | C_i   | prediction error | norm of F_r |
@@ -202,7 +202,7 @@ fn the_published_settings_recover_the_pendulum_parameters() {
 /// | 1e-3  | 14.999 | 3.000 | 6.3e-4           | 1.10        |
 /// | 1e-2  | 15.000 | 3.000 | 2.2e-3           | 0.001       |
 ///
-/// Without the penalty a network takes over what the physics can express; with too much of it, the residual
+/// Without the penalty, the network takes over what the physics can express; with too large a penalty, the residual
 /// vanishes and friction is not learnt.
 #[test]
 fn without_the_penalty_the_parameters_are_not_unique() {
@@ -253,7 +253,7 @@ mod slow {
         }
         let output = run(killed.path(), &[command.as_slice(), &["--json"]].concat());
         let notes = String::from_utf8(output.stderr).unwrap();
-        assert!(notes.contains("note: c goes on from epoch"), "{notes}");
+        assert!(notes.contains("note: c resumes from epoch"), "{notes}");
         let found: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(found, expected);
         for file in [

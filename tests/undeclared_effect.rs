@@ -53,7 +53,7 @@ fn friction_is_named_after_an_episode_and_the_return_recovered() {
     assert!(outcome.reached);
     assert!(outcome.text().contains("coulomb_friction@1"));
 
-    // What is done is not done again, and what another experiment left is not taken for it.
+    // Finished work is not repeated, and the results of another experiment are not mistaken for it.
     let kept = dir.path().join("runs/coulomb_friction-0.json");
     let written = std::fs::metadata(&kept).unwrap().modified().unwrap();
     assert_eq!(session.run(&folder, &|_| {}).unwrap(), outcome);

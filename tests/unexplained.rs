@@ -24,7 +24,7 @@ recording = { logs = 5, duration_s = 10, start = [0, 0] }
 const WHITE: &str = "position_noise = 1e-3, position_step = 0.0";
 const QUANTISED: &str = "position_noise = 2e-4, position_step = 1.5339807878856412e-3";
 
-/// An effect file that no library has.
+/// An effect file that is in no library.
 fn effect(name: &str, force: &str) -> String {
     format!(
         "[effect]\nname = \"{name}\"\nabout = \"hidden\"\nforce = \"{force}\"\n[parameters]\n\
@@ -66,7 +66,7 @@ fn declared(effects: &[&str]) -> Model {
     system
 }
 
-/// What the pendulum with these effects leaves unexplained of the logs, beside the pendulum without.
+/// The pendulum's unexplained residual on the logs with these effects, compared with the pendulum without them.
 fn left(logs: &[Log], effects: &[&str], seed: u64) -> Unexplained {
     let (bare, system) = (declared(&[]), declared(effects));
     let (settings, nothing, probes) = (Settings::default(), Library::empty(), Library::built_in());
@@ -78,7 +78,7 @@ fn left(logs: &[Log], effects: &[&str], seed: u64) -> Unexplained {
     unexplained(&problem, probes.probes(), &before, &fitted, &mut rng(seed))
 }
 
-/// A formula for what the bare pendulum leaves of the logs.
+/// A formula for the bare pendulum's residual on the logs.
 fn proposed(logs: &[Log], seed: u64) -> Option<Proposal> {
     let system = declared(&[]);
     let (settings, nothing, probes) = (Settings::default(), Library::empty(), Library::built_in());
@@ -88,7 +88,7 @@ fn proposed(logs: &[Log], seed: u64) -> Option<Proposal> {
     proposal(&problem, &fitted, &left)
 }
 
-/// An effect of the library that the model has leaves nothing that matters, sharper though the rig's friction is.
+/// A declared effect of the library leaves no significant residual, although the rig's friction is sharper.
 #[test]
 fn a_found_effect_leaves_no_remainder() {
     for seed in 0..3 {
@@ -106,7 +106,7 @@ fn cubic_damping_is_proposed_with_its_size() {
         let size: f64 = found.formula.split(' ').next().unwrap().parse().unwrap();
         assert!((size + 0.0015).abs() < 1e-4, "{found:?}");
         assert!(found.explains > 0.8, "{found:?}");
-        // What the report prints is a file that `--effects` takes.
+        // The report prints a file that `--effects` accepts.
         let library = library(&[found.file]);
         assert_eq!(
             library.effect("proposed").unwrap().parameters[0].unit,
@@ -120,7 +120,7 @@ fn nothing_is_proposed_for_noise() {
     assert_eq!(proposed(&logs(WHITE, "0*size", 3), 3), None);
 }
 
-/// A spring between motor and link, and the logs of the motor alone.
+/// A spring between motor and link, with logs of the motor only.
 const COMPLIANT: &str = r#"
 [system]
 name = "compliant"
@@ -132,7 +132,7 @@ qdd1 = "20*(tau1 - k*(q1 - q2) - 0.02*(qd1 - qd2))"
 qdd2 = "6*(k*(q1 - q2) + 0.02*(qd1 - qd2)) - 17.4*sin(q2)"
 "#;
 
-/// A bristle that bends before the joint slides (Dahl 1968): its deflection stands as the second joint's velocity.
+/// A bristle that bends before the joint slides (Dahl 1968): its deflection is modelled as the second joint's velocity.
 const PRESLIDING: &str = r#"
 [system]
 name = "presliding"
@@ -172,8 +172,8 @@ fn logs_of_first(model: &str, seed: u64) -> Vec<Log> {
         .collect()
 }
 
-/// What has a state of its own is no function of angle, speed, torque and time; it is seen all the same, beside
-/// the effects that come nearest.
+/// An effect with internal state is not a function of angle, speed, torque and time; it is detected all the same, in
+/// addition to the effects that come nearest.
 #[test]
 fn effects_with_internal_state_are_not_taken_for_noise() {
     for model in [COMPLIANT, PRESLIDING] {
@@ -204,7 +204,7 @@ mod slow {
         }
     }
 
-    /// Forces that no effect of the library describes, and where they live.
+    /// Forces that no effect of the library describes, and on which variable they depend.
     #[test]
     fn what_the_library_lacks_is_located() {
         let cases = [

@@ -4,7 +4,7 @@ use std::process::{Command, Output, Stdio};
 
 use crate::support::{residyn, succeeds, text};
 
-/// A log with a joint that stands still, which is serious.
+/// A log with a joint at rest, which is a serious finding.
 fn still() -> tempfile::NamedTempFile {
     let log = tempfile::Builder::new().suffix(".csv").tempfile().unwrap();
     let rows = (0..300).map(|row| format!("{},0.5,0,{}\n", f64::from(row) * 0.01, row % 7));
@@ -27,7 +27,7 @@ fn a_quiet_run_prints_the_headline_alone() {
     assert_eq!(said.lines().count(), 1, "{said}");
     assert!(said.starts_with(&format!("{name}: ")), "{said}");
     assert!(said.contains(" serious, "), "{said}");
-    // The place of the flag does not matter, and neither does it change what a program reads.
+    // The flag's place does not matter, and the flag does not change what a program reads.
     assert_eq!(
         succeeds(&["-q", "check", "pendulum"]),
         "pendulum: 0 finding(s)\n"

@@ -10,7 +10,7 @@ use crate::support::paths::{crates, ours};
 /// Crates by name, and the crates that each may use.
 type Arrows = BTreeMap<String, BTreeSet<String>>;
 
-/// The rows of the tables under "Crates" whose first name satisfies this, each as its cells.
+/// The rows of the tables under "Crates" whose first name satisfies `is_wanted`, each as its cells.
 fn rows(is_wanted: impl Fn(&str) -> bool) -> Vec<Vec<String>> {
     let page = fs::read_to_string(ours("docs/ARCHITECTURE.md")).unwrap();
     let (_, section) = page.split_once("\n## Crates\n").unwrap();
@@ -22,13 +22,13 @@ fn rows(is_wanted: impl Fn(&str) -> bool) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// What a cell has in backquotes.
+/// The names in backquotes in a cell.
 fn names(cell: &str) -> Vec<String> {
     let quoted = cell.split('`').skip(1).step_by(2);
     quoted.map(str::to_owned).collect()
 }
 
-/// What the table of the crates says.
+/// The dependencies in the table of crates.
 fn declared() -> Arrows {
     let rows = rows(|name| name.starts_with("residyn")).into_iter();
     rows.map(|cells| {
@@ -38,7 +38,7 @@ fn declared() -> Arrows {
     .collect()
 }
 
-/// What the manifests say.
+/// The dependencies in the manifests.
 fn built() -> Arrows {
     let dependencies = |folder: &Path| -> BTreeSet<String> {
         let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
@@ -76,7 +76,7 @@ fn lines(folder: &Path, found: &mut Vec<(String, String)>) {
     }
 }
 
-/// Of a room above it, and of none below.
+/// Each room may use rooms above it, and none below.
 #[test]
 fn the_rooms_of_the_core_stand_in_the_order_of_dependence() {
     let rooms: Vec<String> = rows(|name| name.ends_with('/'))
@@ -90,7 +90,7 @@ fn the_rooms_of_the_core_stand_in_the_order_of_dependence() {
         for (file, line) in found {
             for below in &rooms[place + 1..] {
                 assert!(
-                    !line.contains(&format!("crate::{below}::")),
+                    !line.contains(&["crate", below, ""].join("::")),
                     "{file}: {line}"
                 );
             }

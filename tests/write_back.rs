@@ -23,7 +23,8 @@ const FILES: [(&str, Option<&str>); 7] = [
     ("geoms.xml", None),
 ];
 
-/// The chain as a fit might find it: every body heavier and wider, more friction, and larger rotors where the format has such.
+/// The chain as a fit might find it: every body heavier and wider, more friction, and larger rotors if the format has
+/// rotors.
 fn as_fitted(file: &Path, tip: Option<&str>) -> Chain {
     let mut chain = read_to(file, tip);
     let has_rotors = file.extension().unwrap() == "xml";
@@ -41,7 +42,7 @@ fn as_fitted(file: &Path, tip: Option<&str>) -> Chain {
     chain
 }
 
-/// A description with these values, in a file of its own.
+/// A description with these values, in a new file.
 fn written(folder: &Path, file: &Path, tip: Option<&str>, values: &Chain) -> PathBuf {
     let model = folder.join("model.toml");
     fs::write(&model, model_text(values)).unwrap();
@@ -202,12 +203,12 @@ mod slow {
             let out = written(folder.path(), &fixture(name), tip, &values);
             let again = read_to(&out, tip);
             for (again, wanted) in again.joints.iter().zip(&values.joints) {
-                // A rotor may be a part of its body's inertia in the model: the motion tells, below.
+                // In the model, a rotor may be part of its body's inertia; the motion decides, below.
                 let [again_has, wanted_has] = [again, wanted].map(|joint| {
                     let has = &joint.drivetrain;
                     [has.damping, has.friction]
                 });
-                // The file has the digits that people write.
+                // The file has as many digits as people write.
                 let is_same =
                     |(again, wanted): (f64, f64)| (again - wanted).abs() <= 1e-12 * wanted.abs();
                 assert!(
@@ -293,7 +294,7 @@ mod slow {
             (joint.drivetrain.friction - 0.16).abs() < 0.0016,
             "{joint:?}"
         );
-        // Those of configs/demo.toml: the inertia is 1 / C_i, the weight C_g / C_i.
+        // The values of configs/demo.toml: the inertia is 1 / C_i, the weight C_g / C_i.
         let (inertia, weight) = (
             joint.inertia.tensor[(2, 2)],
             9.81 * joint.inertia.moment.norm(),

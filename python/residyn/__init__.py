@@ -9,7 +9,7 @@
         print(effect)                                           # name, joint, parameters with 95 % intervals
     report.model.export("c", "arm.h")
 
-Angles are in rad, velocities in rad/s, torques in N m, times in s; of joints that slide, in m, m/s and N. Arrays of a log
+Angles are in rad, velocities in rad/s, torques in N m, times in s; for sliding joints, in m, m/s and N. Arrays of a log
 have the shape (rows, joints). Whatever cannot be done raises a `ResidynError` that says what is wrong, where, and what to
 do about it.
 """

@@ -21,7 +21,7 @@ class _OfFile(OSError):
 
 
 class ResidynFileNotFoundError(_OfFile, FileNotFoundError, ResidynError):
-    """A file or folder that is not there."""
+    """A file or folder that does not exist."""
 
     code = errno.ENOENT
 
@@ -33,6 +33,6 @@ class ResidynPermissionError(_OfFile, PermissionError, ResidynError):
 
 
 class ResidynIsADirectoryError(_OfFile, IsADirectoryError, ResidynError):
-    """A folder where a file is meant."""
+    """A folder where a file is expected."""
 
     code = errno.EISDIR

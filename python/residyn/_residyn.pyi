@@ -58,7 +58,7 @@ class Library:
             The larger library.
 
         Raises:
-            ResidynError: a folder that cannot be read, or a file that is no effect, with line, column and remedy.
+            ResidynError: a folder that cannot be read, or a file that is not an effect, with line, column and remedy.
         """
     def with_effect(self, text: str) -> Library:
         """The library with one more effect.
@@ -70,7 +70,7 @@ class Library:
             The larger library.
 
         Raises:
-            ResidynError: a text that is no effect, with line, column and remedy.
+            ResidynError: a text that is not an effect, with line, column and remedy.
         """
     @property
     def effects(self) -> list[str]:
@@ -98,14 +98,14 @@ class Log:
 
     Args:
         time: s, shape (rows,), strictly increasing; irregular sampling is fine.
-        q: joint angles in rad (m of joints that slide), shape (rows, joints), or (rows,) of one joint.
-        qd: joint velocities in rad/s, of the same shape; without them they come from the angles.
+        q: joint angles in rad (m for sliding joints), shape (rows, joints), or (rows,) for one joint.
+        qd: joint velocities in rad/s, of the same shape; without them they are computed from the angles.
         tau: joint torques in N m (N), of the same shape; without torques and commands, the rig is passive.
-        cmd: commands of the drives in place of torques: targets of servos, volts, amperes.
+        cmd: commands of the drives instead of torques: targets of servos, volts, amperes.
         name: what messages and reports call the log.
 
     Raises:
-        ResidynError: arrays of other lengths, numbers that are not finite, or time that does not increase.
+        ResidynError: arrays of different lengths, numbers that are not finite, or time that does not increase.
     """
 
     def __new__(
@@ -120,12 +120,12 @@ class Log:
     ) -> Log: ...
     @staticmethod
     def from_dataframe(frame: Any, *, model: Model | None = None, name: str = "log") -> Log:
-        """A log of a data frame of pandas or polars, or of anything else that has `columns` and gives one for its name.
+        """A log from a pandas or polars data frame, or from anything else that has `columns` and returns one by name.
 
         Args:
             frame: with the columns of a log file: time, q1, ..., and qd1, ..., tau1, ... or cmd1, ...; or those that a
-                model's `[columns]` name. Others are passed over.
-            model: of the rig; without it, the columns have the standard names and units.
+                model's `[columns]` name. Others are ignored.
+            model: that of the rig; without it, the columns have the standard names and units.
             name: what messages and reports call the log.
 
         Returns:
@@ -135,7 +135,7 @@ class Log:
             ResidynError: a column that is missing, numbers that are missing or not finite, or time that does not increase.
         """
     def to_pandas(self) -> Any:
-        """The log as a data frame of pandas.
+        """The log as a pandas data frame.
 
         Returns:
             A pandas.DataFrame with the columns `columns`.
@@ -144,7 +144,7 @@ class Log:
             ImportError: pandas is not installed.
         """
     def to_polars(self) -> Any:
-        """The log as a data frame of polars.
+        """The log as a polars data frame.
 
         Returns:
             A polars.DataFrame with the columns `columns`.
@@ -176,19 +176,19 @@ class Log:
         """The number of joints."""
     @property
     def name(self) -> str:
-        """What messages and reports call the log: of a file, its name."""
+        """What messages and reports call the log: for a file, its name."""
     @property
     def notes(self) -> list[str]:
         """What a reader of the log should know about how it was read, one sentence each."""
     def leave_out(self, start_s: float, end_s: float) -> Log:
-        """The same log without the stretch from start_s to end_s: it is neither fitted nor scored.
+        """The same log without the interval from start_s to end_s, which is neither fitted nor scored.
 
         Args:
-            start_s: where it begins in s, in the log's own time.
-            end_s: where it ends in s.
+            start_s: start of the interval in s, in the log's own time.
+            end_s: end of the interval in s.
 
         Returns:
-            The log; `q` and the other arrays have all rows still.
+            The log; `q` and the other arrays still have all rows.
 
         Raises:
             ResidynError: an end that does not come after the start.
@@ -197,7 +197,7 @@ class Log:
         """What the log is good for: sampling, noise, lags, and a list of `findings`, the most serious first.
 
         Args:
-            model: whose `[columns]` say what the columns of the file hold.
+            model: its `[columns]` say what the columns of the file hold.
 
         Returns:
             As `residyn audit --json` prints it; a finding has a `severity` ("serious", "warning" or "info") and a `text`.
@@ -206,7 +206,7 @@ class Log:
         """Write the log as CSV with the columns time, q1, ..., qd1, ..., tau1, ... or cmd1, ...
 
         Args:
-            path: the file; one that is there is replaced.
+            path: the file; an existing one is replaced.
 
         Raises:
             ResidynError: a folder that cannot be written.
@@ -219,7 +219,7 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """As equations call it."""
+        """Its name in the equations."""
     @property
     def value(self) -> float:
         """In `unit`."""
@@ -243,8 +243,8 @@ class Model:
 
         Args:
             path: a file, or one of `residyn.names("systems")`.
-            effects: a `Library`, or folders of effect files of your own beside the built-in ones; `close_loop` then considers
-                them.
+            effects: a `Library`, or folders of your own effect files in addition to the built-in ones; `close_loop`
+                then considers them.
 
         Returns:
             The model.
@@ -271,12 +271,12 @@ class Model:
     def from_urdf(
         path: _Path, *, tip: str | None = None, drive: str | None = None, effects: Library | Sequence[_Path] = ...
     ) -> Model:
-        """The serial chain of a URDF: every link's inertia a parameter, its value there the declared one.
+        """The serial chain of a URDF: every link's inertia is a parameter, declared with its value in the file.
 
         Args:
             path: the file.
             tip: the last link; without it, the end of the longest branch.
-            drive: what drives the joints, where logs hold commands: one of `residyn.names("drives")`.
+            drive: what drives the joints, if logs hold commands: one of `residyn.names("drives")`.
             effects: as for `read`.
 
         Returns:
@@ -286,18 +286,18 @@ class Model:
             ResidynError: a file that cannot be read or holds no serial chain, or an unknown drive.
 
         Warns:
-            UserWarning: of what is read differently or not at all.
+            UserWarning: about what is read differently or not at all.
         """
     @staticmethod
     def from_mjcf(
         path: _Path, *, tip: str | None = None, drive: str | None = None, effects: Library | Sequence[_Path] = ...
     ) -> Model:
-        """The serial chain of an MJCF file of MuJoCo: every link's inertia a parameter; position actuators are taken over.
+        """The serial chain of a MuJoCo MJCF file: every link's inertia is a parameter; position actuators are adopted.
 
         Args:
             path: the file.
             tip: the last body; without it, the end of the longest branch.
-            drive: what drives the joints, where logs hold commands: one of `residyn.names("drives")`.
+            drive: what drives the joints, if logs hold commands: one of `residyn.names("drives")`.
             effects: as for `read`.
 
         Returns:
@@ -307,7 +307,7 @@ class Model:
             ResidynError: a file that cannot be read or holds no serial chain, or an unknown drive.
 
         Warns:
-            UserWarning: of what is read differently or not at all.
+            UserWarning: about what is read differently or not at all.
         """
     @property
     def name(self) -> str:
@@ -317,7 +317,7 @@ class Model:
         """The number of joints."""
     @property
     def joint_names(self) -> list[str]:
-        """As a URDF or the rig calls the joints; empty where they have numbers alone."""
+        """Names of the joints in a URDF or on the rig; empty if they only have numbers."""
     @property
     def parameters(self) -> list[Parameter]:
         """All parameters, those of effects after those of the equations."""
@@ -334,19 +334,19 @@ class Model:
         """The declared equations in LaTeX.
 
         Returns:
-            An equation a text; of a chain of bodies, their form.
+            One text per equation; for a chain of bodies, their form.
         """
     def write(self, path: _Path) -> None:
         """Write the model file.
 
         Args:
-            path: the file; one that is there is replaced.
+            path: the file; an existing one is replaced.
 
         Raises:
             ResidynError: a folder that cannot be written.
         """
     def read_log(self, path: _Path) -> Log:
-        """Read a log of this rig, of any format that is read, by the model's `[columns]`.
+        """Read a log of this rig in any supported format, by the model's `[columns]`.
 
         Args:
             path: the file, or the folder of a LeRobot data set.
@@ -362,20 +362,21 @@ class Model:
         start of each, under the logged torques.
 
         Args:
-            log: of a rig with as many joints.
+            log: of a rig with the same number of joints.
             horizon_s: length of a window in s.
 
         Returns:
-            A `Prediction` a window: `time` in s, shape (rows,), and `q`, joint angles in rad (or m), shape (rows, joints).
+            A `Prediction` per window: `time` in s, shape (rows,), and `q`, joint angles in rad (or m),
+            shape (rows, joints).
 
         Raises:
             ResidynError: a log of another rig, or a horizon that is not above zero.
         """
     def torques(self, log: Log) -> Torques:
-        """The torques that the logged motion needs by the model, beside the logged ones, both low-passed.
+        """The torques that the logged motion needs according to the model, and the logged ones, both low-passed.
 
         Args:
-            log: of a rig with as many joints.
+            log: of a rig with the same number of joints.
 
         Returns:
             `Torques`: `time` in s, shape (rows,); `logged` and `needed` in N m (or N), shape (rows, joints).
@@ -394,20 +395,20 @@ class Model:
             torque: compare the torques that the motion needs with the logged ones as well.
 
         Returns:
-            `horizons_s`, and for each of them, a number a joint: `position_rmse` and `position_median` in rad (or m),
-            `velocity_rmse` in rad/s (or m/s); `windows`, `diverged`. With `torque`, `torque`: `rms` of each joint in N m (or N)
-            and `relative`.
+            `horizons_s`, and for each horizon, one number per joint: `position_rmse` and `position_median` in rad (or
+            m), `velocity_rmse` in rad/s (or m/s); `windows`, `diverged`. With `torque`, `torque`: `rms` of each joint
+            in N m (or N) and `relative`.
 
         Raises:
-            ResidynError: logs that hold no window of a horizon.
+            ResidynError: logs that are shorter than a horizon.
         """
     def rollout(self, state: ArrayLike, tau: ArrayLike, step_s: float, integrator: str = "rk4") -> _Array:
         """Integrate the model from a state, holding each torque (or command) for `step_s`.
 
         Args:
             state: positions, then velocities, shape (2 joints,).
-            tau: shape (steps, joints), or (steps,) of one joint.
-            step_s: how long each is held, in s.
+            tau: shape (steps, joints), or (steps,) for one joint.
+            step_s: how long each torque is held, in s.
             integrator: "rk4", "semi_implicit_euler" or "fine:N" for N substeps.
 
         Returns:
@@ -421,7 +422,7 @@ class Model:
 
         Args:
             format: one of `residyn.names("formats")`: "c", "onnx", "fmi3" ...
-            path: the file to write; formats of several files put the others beside it.
+            path: the file to write; formats with several files put the others next to it.
             step_s: how long a torque is held, in s.
             integrator: "rk4", "semi_implicit_euler" or "fine:N" for N substeps.
 
@@ -443,7 +444,7 @@ class Outcome:
             The text of report.json.
         """
     def html(self) -> str:
-        """The report as a page for a browser, whole in itself.
+        """The report as a self-contained page for a browser.
 
         Returns:
             HTML.
@@ -464,7 +465,7 @@ class Outcome:
         """Write report.html, report.md, report.json, model.toml, plots and the network into a folder.
 
         Args:
-            folder: made where it is missing.
+            folder: created if it is missing.
 
         Raises:
             ResidynError: a folder that cannot be written.
@@ -476,7 +477,7 @@ class Episode:
 
     @property
     def log(self) -> Log:
-        """What the sensors said and what was commanded: a row a step, and one for the end."""
+        """What the sensors said and what was commanded: one row per step, and one for the end."""
     @property
     def rewards(self) -> _Array:
         """The reward of each step, shape (steps,)."""
@@ -527,7 +528,7 @@ class Rig:
         """Hold a torque (or command) for a step.
 
         Args:
-            tau: of each joint in N m (or N), shape (joints,).
+            tau: torque of each joint in N m (or N), shape (joints,).
 
         Returns:
             `Step`: the measured `state`, shape (2 joints,), and the `reward` of the step by the task.
@@ -537,9 +538,9 @@ class Rig:
         """
 
 def read_log(path: _Path) -> Log:
-    """Read a log of any format that is read, with the standard columns and as many joints as it has.
+    """Read a log in any supported format, with the standard columns and as many joints as it has.
 
-    Where columns have other names or units, the model says so: `Model.read_log`.
+    If columns have other names or units, the model says so: `Model.read_log`.
 
     Args:
         path: the file.
@@ -565,13 +566,13 @@ def simulate(
         plant: a plant or model file, or a built-in plant or system by its name.
         effects: what its model does not declare: the value of an effect's first parameter, or of several by their names;
             "coulomb_friction@2" is on joint 2.
-        seed: of excitation and noise; the same seed gives the same log.
-        duration_s: in place of the plant's own.
+        seed: for excitation and noise; the same seed gives the same log.
+        duration_s: instead of the plant's own.
         name: what messages and reports call the log; by default the plant's name and the seed.
         library: the effects to choose from; by default the built-in ones.
 
     Returns:
-        What the rig's sensors said, and its torques or commands.
+        The readings of the rig's sensors, and its torques or commands.
 
     Raises:
         ResidynError: a plant or effect that is unknown, or a rig that diverges.
@@ -582,11 +583,11 @@ def control(
     """Control a simulated plant by model-predictive control with a receding horizon.
 
     Args:
-        model: what plans: a model, or the folder of a trained model's checkpoint.
+        model: what to plan with: a model, or the folder of a trained model's checkpoint.
         plant: a plant or model file, or a built-in plant or system by its name.
         task: a task file, or a built-in task; by default a built-in one of the plant's system.
         episodes: how many.
-        seed: of starts, noise and plans; the same seed gives the same episodes.
+        seed: for starts, noise and plans; the same seed gives the same episodes.
 
     Returns:
         The episodes.
@@ -603,14 +604,14 @@ def train(
 ) -> dict[str, Any]:
     """Train a hybrid, physics-only or data-driven model from scratch, on logs or on a simulated plant.
 
-    The same call goes on with a run that was interrupted, and ends with the same numbers.
+    The same call resumes an interrupted run, and ends with the same numbers.
 
     Args:
         config: the training recipe: a file, or a dictionary with the keys of one, where paths are relative to the working
             directory.
         out: the folder of the checkpoint.
         seed: of everything random; the same seed gives the same result on the same machine.
-        progress: called after each epoch with the number of epochs done, of all, and the loss.
+        progress: called after each epoch with the number of epochs done, their total, and the loss.
 
     Returns:
         Errors and parameters before and after, as `residyn train --json` prints them.
@@ -634,9 +635,9 @@ def tune(
         checkpoint: the folder of the trained model.
         out: the folder of the new checkpoint.
         config: a recipe, a file or a dictionary as for `train`; or
-        logs: files of logs, for a recipe that suits most.
+        logs: log files, for a recipe that suits most cases.
         seed: of everything random.
-        progress: called after each epoch with the number of epochs done, of all, and the loss.
+        progress: called after each epoch with the number of epochs done, their total, and the loss.
 
     Returns:
         Errors and parameters before and after, as `train` returns them.
@@ -654,13 +655,13 @@ def names(of: str) -> list[str]:
         The names.
 
     Raises:
-        ResidynError: another kind.
+        ResidynError: an unknown kind.
     """
 def stages() -> list[str]:
     """The stages of closing the loop.
 
     Returns:
-        Their names in their order, as `progress` is told them.
+        Their names in order, as `progress` receives them.
     """
 def main(file: _Path, arguments: Sequence[str]) -> int:
     """Run the command line.

@@ -40,7 +40,7 @@ class Environment(gymnasium.Env[Array, Array]):
         return self._rig.reset(seed), {}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Hold the torque for a step; one outside of the task's bounds is cut to them."""
+        """Hold the torque for a step; a torque outside the task's bounds is clipped to them."""
         assert isinstance(self.action_space, gymnasium.spaces.Box)
         measured, reward = self._rig.step(numpy.clip(action, self.action_space.low, self.action_space.high))
         self._steps += 1

@@ -30,21 +30,21 @@ def close_loop(
     Args:
         model: the declared model.
         train: logs to learn from, or their files.
-        test: logs to judge by, never fitted; without them, the last logs or the end of each are set apart.
+        test: logs to test on, never fitted; without them, the last logs or the end of each log are set apart.
         against: other models of the same rig, by name, to score as they are.
         seed: of everything random; the same seed gives the same result on the same machine.
         budget_s: time in s after which the search for effects stops where it stands.
-        errors: which errors to compare: of the open-loop motion, or of the torques that the logged motion needs; without
-            it, those that say more about these logs.
+        errors: which errors to compare: of the open-loop motion, or of the torques that the logged motion needs;
+            without it, whichever say more about these logs.
         network: train a small network on what no effect explains.
-        progress: called with the stage, what is being done in it and, where that is a number of models to fit, how many
-            of how many are done.
+        progress: called with the stage, what is being done in it and, if it is fitting a number of models, how many are
+            done out of how many.
 
     Returns:
-        What was found; in a notebook it shows itself.
+        What was found; a notebook displays it.
 
     Raises:
-        ResidynError: logs without a usable stretch, or of another rig; a model that diverges from its starting values.
+        ResidynError: logs without a usable segment, or of another rig; a model that diverges from its starting values.
     """
     learnt, judged = ([_log(model, log) for log in logs] for logs in (train, test))
     others = list((against or {}).items())

@@ -17,9 +17,9 @@ class EffectParameter:
     """A parameter of an effect.
 
     Attributes:
-        name: as equations call it.
+        name: its name in the equations.
         value: in `unit`.
-        ci95: 95 % interval, lower end first; None where the parameter was held.
+        ci95: 95 % interval, lower end first; None if the parameter was held.
         unit: SI; empty for a pure number.
     """
 
@@ -43,7 +43,7 @@ class Effect:
         expression: the effect's formula.
         parameters: with values and intervals.
         p_value: how likely the logs are without the effect.
-        error_reduction: share of the error that this effect alone takes away; None where the fit without it failed.
+        error_reduction: share of the error that this effect alone removes; None if the fit without it failed.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class TorqueErrors:
-    """How far the torques that the logged motion needs by a model are from the logged ones, over all test logs.
+    """How far the torques that a model needs for the logged motion are from the logged ones, over all test logs.
 
     Attributes:
         rms: root mean square of the difference in N m (or N), shape (joints,).
@@ -152,7 +152,7 @@ class Report:
 
     @property
     def with_friction(self) -> Errors | None:
-        """The same with viscous and Coulomb friction on every joint, fitted; None where the declared model has both."""
+        """As `before`, with viscous and Coulomb friction on every joint, fitted; None if the model has both."""
         return self._errors_where_there("with_friction", "with_friction")
 
     @property
@@ -162,12 +162,12 @@ class Report:
 
     @property
     def hybrid(self) -> Errors | None:
-        """The same with a network trained on what is left; None where none was trained."""
+        """As `after`, with a network trained on what is left; None if none was trained."""
         return self._errors_where_there("hybrid", "hybrid")
 
     @property
     def reduction_ci95(self) -> tuple[float, float] | None:
-        """95 % interval of the relative reduction of the position error, before to after; None where the logs are too few."""
+        """95 % interval of the relative reduction of the position error, before to after; None for too few logs."""
         found = self._found["error"]["reduction_ci95"]
         return None if found is None else (found[0], found[1])
 
@@ -184,7 +184,7 @@ class Report:
         """Write report.html, report.md, report.json, model.toml, plots and the network into a folder.
 
         Args:
-            folder: made where it is missing.
+            folder: created if it is missing.
 
         Raises:
             ResidynError: a folder that cannot be written.
@@ -192,7 +192,7 @@ class Report:
         self._outcome.write(folder)
 
     def html(self) -> str:
-        """The report as a page for a browser, whole in itself."""
+        """The report as a self-contained page for a browser."""
         return self._outcome.html()
 
     def markdown(self) -> str:

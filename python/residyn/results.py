@@ -26,7 +26,7 @@ class Torques(NamedTuple):
     Attributes:
         time: time of each row in s, shape (rows,).
         logged: what the log holds in N m (or N), shape (rows, joints).
-        needed: what the motion needs by the model in N m (or N), shape (rows, joints).
+        needed: what the motion needs according to the model in N m (or N), shape (rows, joints).
     """
 
     time: _Array

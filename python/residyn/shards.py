@@ -20,7 +20,7 @@ def run_shard(
 ) -> None:
     """Do one shard of a command in the folder OUT.parts/NUMBER, or what is left of it.
 
-    It ends when this process does, however that comes. Done again, it goes on where it was.
+    It ends when this process does, however that ends. Run again, it resumes where it stopped.
 
     Args:
         command: words of the command line, without `residyn`, `--shard` and `--out`.
@@ -30,7 +30,7 @@ def run_shard(
         threads: how many to use.
 
     Raises:
-        ResidynError: the shard could not be done, with the words of the program.
+        ResidynError: the shard could not be done, with the program's message.
     """
     _succeeds([*command, "--shard", f"{number}/{of}", "--out", _part(out, number)], threads)
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::error::ResidynError;
 
-/// Anything that NumPy makes an array of floats of.
+/// Anything that NumPy can turn into an array of floats.
 pub type ArrayLike<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
 
 /// A vector of shape (rows,).

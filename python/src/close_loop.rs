@@ -6,7 +6,9 @@ use pyo3::prelude::*;
 use residyn::{
     Library, Log as Recorded, Model as Declared, Origin, Reference, Request, Settings, rng,
 };
-use residyn_core::closeloop::{Fits, Progress, Space, Split, Stage, StageTimes, StudyError, Watch};
+use residyn_core::closeloop::{
+    ErrorModel, Fits, Progress, Split, Stage, StageTimes, StudyError, Watch,
+};
 use residyn_report as report;
 use residyn_report::Report;
 use residyn_train::{Backend, ResidualTrainer};
@@ -37,7 +39,7 @@ impl Outcome {
         serde_json::to_string(&self.report).expect("a report has only finite numbers and texts")
     }
 
-    /// The report as a page for a browser, whole in itself.
+    /// The report as a self-contained page for a browser.
     ///
     /// Returns:
     ///     HTML.
@@ -67,7 +69,7 @@ impl Outcome {
     /// Write report.html, report.md, report.json, model.toml, plots and the network into a folder.
     ///
     /// Args:
-    ///     folder: made where it is missing.
+    ///     folder: created if it is missing.
     ///
     /// Raises:
     ///     ResidynError: a folder that cannot be written.
@@ -92,19 +94,19 @@ struct Question {
     library: Library,
     split: Split,
     against: Vec<Reference>,
-    space: Option<Space>,
+    error_model: Option<ErrorModel>,
     budget: Duration,
     network: bool,
     seed: u64,
 }
 
-/// A stage, what is being done in it, and how many fits of how many are done.
-type Told = (&'static str, String, Option<(usize, usize)>);
+/// A stage, what is being done in it, and how many fits are done out of how many.
+type Message = (&'static str, String, Option<(usize, usize)>);
 
 /// Tells Python what is done, and ends the search when its time is spent.
 struct Watcher<'l> {
-    listener: &'l Listener<Told>,
-    /// `None` where the search may take longer than a clock counts.
+    listener: &'l Listener<Message>,
+    /// `None` if the search may take longer than a clock counts.
     deadline: Option<Instant>,
     start: Instant,
     times: Mutex<StageTimes>,
@@ -128,13 +130,13 @@ impl Watch for Watcher<'_> {
 }
 
 impl Question {
-    fn answer(&self, listener: &Listener<Told>) -> Result<residyn::Outcome, StudyError> {
+    fn answer(&self, listener: &Listener<Message>) -> Result<residyn::Outcome, StudyError> {
         let learner = ResidualTrainer {
             backend: Backend::default(),
         };
         let mut request = Request::new(&self.model, &self.library, self.split.clone());
         request.against.clone_from(&self.against);
-        request.space = self.space;
+        request.error_model = self.error_model;
         if self.network {
             request.learner = Some(&learner);
         }
@@ -167,7 +169,7 @@ impl Question {
                 "train": names(&self.split.train),
                 "test": names(&self.split.test),
                 "against": against,
-                "errors": self.space,
+                "errors": self.error_model,
                 "budget_s": self.budget.as_secs_f64(),
                 "network": self.network,
             }),
@@ -208,14 +210,14 @@ pub fn close_loop(
         library: model.library.clone(),
         split: split(recorded(&train), recorded(&test))?,
         against: references.collect(),
-        space: errors.map(space).transpose()?,
+        error_model: errors.map(error_model).transpose()?,
         budget: Duration::try_from_secs_f64(budget_s)
             .map_err(|why| ResidynError::new_err(format!("budget_s = {budget_s}: {why}")))?,
         network,
         seed,
     };
     let origin = question.origin();
-    let heard = |(stage, text, fits): Told| match &progress {
+    let heard = |(stage, text, fits): Message| match &progress {
         Some(callback) => {
             let (done, of) = fits.unzip();
             callback.call1(py, (stage, text, done, of)).map(drop)
@@ -244,10 +246,10 @@ fn split(train: Vec<Recorded>, test: Vec<Recorded>) -> PyResult<Split> {
     }
 }
 
-fn space(errors: &str) -> PyResult<Space> {
+fn error_model(errors: &str) -> PyResult<ErrorModel> {
     match errors {
-        "motion" => Ok(Space::Motion),
-        "torque" => Ok(Space::Torque),
+        "motion" => Ok(ErrorModel::OutputError),
+        "torque" => Ok(ErrorModel::InverseDynamics),
         _ => Err(ResidynError::new_err(format!(
             "errors = {errors:?}: give \"motion\", \"torque\", or None for those that say more about these logs"
         ))),
@@ -257,7 +259,7 @@ fn space(errors: &str) -> PyResult<Space> {
 /// The stages of closing the loop.
 ///
 /// Returns:
-///     Their names in their order, as `progress` is told them.
+///     Their names in order, as `progress` receives them.
 #[pyfunction]
 pub fn stages() -> Vec<&'static str> {
     Stage::ALL.map(Stage::text).to_vec()

@@ -23,7 +23,7 @@ pub struct Episode(Played);
 
 #[pymethods]
 impl Episode {
-    /// What the sensors said and what was commanded: a row a step, and one for the end.
+    /// What the sensors said and what was commanded: one row per step, and one for the end.
     #[getter]
     fn log(&self) -> Log {
         Log(self.0.stretch.log.clone())
@@ -56,7 +56,7 @@ impl Episode {
     }
 }
 
-/// What plans: a model, or the checkpoint of a trained one.
+/// What to plan with: a model, or the checkpoint of a trained one.
 #[derive(FromPyObject)]
 pub enum Planned<'py> {
     Model(PyRef<'py, Model>),
@@ -110,11 +110,11 @@ impl Question {
 /// Control a simulated plant by model-predictive control with a receding horizon.
 ///
 /// Args:
-///     model: what plans: a model, or the folder of a trained model's checkpoint.
+///     model: what to plan with: a model, or the folder of a trained model's checkpoint.
 ///     plant: a plant or model file, or a built-in plant or system by its name.
 ///     task: a task file, or a built-in task; by default a built-in one of the plant's system.
 ///     episodes: how many.
-///     seed: of starts, noise and plans; the same seed gives the same episodes.
+///     seed: for starts, noise and plans; the same seed gives the same episodes.
 ///
 /// Returns:
 ///     The episodes.

@@ -19,7 +19,7 @@ pyo3::create_exception!(
 pub trait OrRaise<T> {
     fn or_raise(self) -> PyResult<T>;
 
-    /// The same of what reads a path.
+    /// As above, for an operation that reads a path.
     fn or_raise_at(self, path: &Path) -> PyResult<T>;
 }
 
@@ -36,7 +36,7 @@ impl<T, E: Error + 'static> OrRaise<T> for Result<T, E> {
     }
 }
 
-/// Why a path cannot be opened, if so. Messages of the library hold it as words alone.
+/// Why a path cannot be opened, if so. Messages of the library hold it only as text.
 fn unreadable(path: &Path) -> Option<io::Error> {
     match fs::metadata(path) {
         Ok(found) if found.is_dir() => None,
@@ -45,16 +45,16 @@ fn unreadable(path: &Path) -> Option<io::Error> {
     }
 }
 
-/// What could not be written, and why, if an error is of that.
+/// What could not be written, and why, if that is the error.
 fn written<'a>(error: &'a (dyn Error + 'static)) -> Option<(io::Error, &'a Path)> {
     let mut causes = std::iter::successors(Some(error), |error| (**error).source());
     let output = causes.find_map(|cause| cause.downcast_ref::<OutputError>())?;
     Some((output.source.kind().into(), &output.path))
 }
 
-/// A `ResidynError`; where the operating system refuses a file, one that is Python's own class for that as well.
+/// A `ResidynError`; if the operating system refuses a file, one that is also Python's own class for that.
 fn raised(error: &dyn Error, refused: Option<(io::Error, &Path)>) -> PyErr {
-    let message = told(error);
+    let message = message(error);
     let class = refused.and_then(|(why, path)| {
         let class = match why.kind() {
             ErrorKind::NotFound => "ResidynFileNotFoundError",
@@ -78,16 +78,16 @@ fn of_file(py: Python<'_>, class: &str, message: &str, path: &Path) -> PyResult<
     Ok(PyErr::from_value(error))
 }
 
-/// An error and its causes. One that the message before it contains is not repeated.
-fn told(error: &dyn Error) -> String {
-    let mut told = error.to_string();
+/// An error and its causes. A cause that the message before it contains is not repeated.
+fn message(error: &dyn Error) -> String {
+    let mut message = error.to_string();
     let mut next = error.source();
     while let Some(cause) = next {
         let text = cause.to_string();
-        if !told.contains(&text) {
-            told = format!("{told}: {text}");
+        if !message.contains(&text) {
+            message = format!("{message}: {text}");
         }
         next = cause.source();
     }
-    told
+    message
 }

@@ -11,7 +11,7 @@ mod rig;
 mod train;
 mod work;
 
-/// What every class and function of the package is made of.
+/// The compiled classes and functions behind the package.
 #[pyo3::pymodule]
 mod _residyn {
     use std::ffi::OsString;
@@ -65,7 +65,7 @@ mod _residyn {
     ///     The names.
     ///
     /// Raises:
-    ///     ResidynError: another kind.
+    ///     ResidynError: an unknown kind.
     #[pyfunction]
     fn names(of: &str) -> PyResult<Vec<String>> {
         let library = residyn::Library::built_in();

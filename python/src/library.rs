@@ -30,7 +30,7 @@ impl Library {
     ///     The larger library.
     ///
     /// Raises:
-    ///     ResidynError: a folder that cannot be read, or a file that is no effect, with line, column and remedy.
+    ///     ResidynError: a folder that cannot be read, or a file that is not an effect, with line, column and remedy.
     fn with_folder(&self, path: PathBuf) -> PyResult<Self> {
         let more = with_effects_in(&path, self.0.clone());
         more.or_raise_at(&path).map(Self)
@@ -45,7 +45,7 @@ impl Library {
     ///     The larger library.
     ///
     /// Raises:
-    ///     ResidynError: a text that is no effect, with line, column and remedy.
+    ///     ResidynError: a text that is not an effect, with line, column and remedy.
     fn with_effect(&self, text: &str) -> PyResult<Self> {
         Ok(Self(self.0.clone().with_effect(text.parse().or_raise()?)))
     }
@@ -98,7 +98,7 @@ impl Default for Effects<'_> {
 }
 
 impl Effects<'_> {
-    /// Those of a library, or the built-in effects and those of folders.
+    /// The effects of a library, or the built-in effects and those of folders.
     pub fn library(self) -> PyResult<Known> {
         match self {
             Self::Library(library) => Ok(library.0.clone()),

@@ -18,14 +18,14 @@ use crate::model::Model;
 ///
 /// Args:
 ///     time: s, shape (rows,), strictly increasing; irregular sampling is fine.
-///     q: joint angles in rad (m of joints that slide), shape (rows, joints), or (rows,) of one joint.
-///     qd: joint velocities in rad/s, of the same shape; without them they come from the angles.
+///     q: joint angles in rad (m for sliding joints), shape (rows, joints), or (rows,) for one joint.
+///     qd: joint velocities in rad/s, of the same shape; without them they are computed from the angles.
 ///     tau: joint torques in N m (N), of the same shape; without torques and commands, the rig is passive.
-///     cmd: commands of the drives in place of torques: targets of servos, volts, amperes.
+///     cmd: commands of the drives instead of torques: targets of servos, volts, amperes.
 ///     name: what messages and reports call the log.
 ///
 /// Raises:
-///     ResidynError: arrays of other lengths, numbers that are not finite, or time that does not increase.
+///     ResidynError: arrays of different lengths, numbers that are not finite, or time that does not increase.
 #[pyclass(frozen, module = "residyn")]
 pub struct Log(pub residyn::Log);
 
@@ -60,12 +60,12 @@ impl Log {
         Ok(Self(channels.log(name).or_raise()?))
     }
 
-    /// A log of a data frame of pandas or polars, or of anything else that has `columns` and gives one for its name.
+    /// A log from a pandas or polars data frame, or from anything else that has `columns` and returns one by name.
     ///
     /// Args:
     ///     frame: with the columns of a log file: time, q1, ..., and qd1, ..., tau1, ... or cmd1, ...; or those that a
-    ///         model's `[columns]` name. Others are passed over.
-    ///     model: of the rig; without it, the columns have the standard names and units.
+    ///         model's `[columns]` name. Others are ignored.
+    ///     model: that of the rig; without it, the columns have the standard names and units.
     ///     name: what messages and reports call the log.
     ///
     /// Returns:
@@ -95,7 +95,7 @@ impl Log {
         log.map(Self)
     }
 
-    /// The log as a data frame of pandas.
+    /// The log as a pandas data frame.
     ///
     /// Returns:
     ///     A pandas.DataFrame with the columns `columns`.
@@ -106,7 +106,7 @@ impl Log {
         self.frame(py, "pandas")
     }
 
-    /// The log as a data frame of polars.
+    /// The log as a polars data frame.
     ///
     /// Returns:
     ///     A polars.DataFrame with the columns `columns`.
@@ -173,7 +173,7 @@ impl Log {
         self.0.joints()
     }
 
-    /// What messages and reports call the log: of a file, its name.
+    /// What messages and reports call the log: for a file, its name.
     #[getter]
     fn name(&self) -> String {
         self.0.name()
@@ -185,14 +185,14 @@ impl Log {
         self.0.notes.clone()
     }
 
-    /// The same log without the stretch from start_s to end_s: it is neither fitted nor scored.
+    /// The same log without the interval from start_s to end_s, which is neither fitted nor scored.
     ///
     /// Args:
-    ///     start_s: where it begins in s, in the log's own time.
-    ///     end_s: where it ends in s.
+    ///     start_s: start of the interval in s, in the log's own time.
+    ///     end_s: end of the interval in s.
     ///
     /// Returns:
-    ///     The log; `q` and the other arrays have all rows still.
+    ///     The log; `q` and the other arrays still have all rows.
     ///
     /// Raises:
     ///     ResidynError: an end that does not come after the start.
@@ -210,7 +210,7 @@ impl Log {
     /// What the log is good for: sampling, noise, lags, and a list of `findings`, the most serious first.
     ///
     /// Args:
-    ///     model: whose `[columns]` say what the columns of the file hold.
+    ///     model: its `[columns]` say what the columns of the file hold.
     ///
     /// Returns:
     ///     As `residyn audit --json` prints it; a finding has a `severity` ("serious", "warning" or "info") and a `text`.
@@ -225,7 +225,7 @@ impl Log {
     /// Write the log as CSV with the columns time, q1, ..., qd1, ..., tau1, ... or cmd1, ...
     ///
     /// Args:
-    ///     path: the file; one that is there is replaced.
+    ///     path: the file; an existing one is replaced.
     ///
     /// Raises:
     ///     ResidynError: a folder that cannot be written.
@@ -269,7 +269,7 @@ impl Log {
 /// The columns of a data frame.
 struct Columns {
     numbers: Vec<(String, Vec<f64>)>,
-    /// Names of those that hold texts, dates or whatever is no number.
+    /// Names of the columns that hold texts, dates or anything else that is not a number.
     others: Vec<String>,
 }
 
@@ -281,7 +281,7 @@ fn columns_of(frame: &Bound<'_, PyAny>) -> PyResult<Columns> {
     };
     for label in frame.getattr("columns")?.try_iter()? {
         let label = label?;
-        // What has no text for its name is no column of a log.
+        // A column whose name is not a text is not a column of a log.
         let Ok(name) = label.extract::<String>() else {
             continue;
         };
@@ -303,9 +303,9 @@ fn columns_of(frame: &Bound<'_, PyAny>) -> PyResult<Columns> {
     Ok(columns)
 }
 
-/// Read a log of any format that is read, with the standard columns and as many joints as it has.
+/// Read a log in any supported format, with the standard columns and as many joints as it has.
 ///
-/// Where columns have other names or units, the model says so: `Model.read_log`.
+/// If columns have other names or units, the model says so: `Model.read_log`.
 ///
 /// Args:
 ///     path: the file.

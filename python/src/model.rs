@@ -26,7 +26,7 @@ pub struct Model {
 /// A physical parameter of a model, or of one of its effects.
 #[pyclass(frozen, get_all, module = "residyn")]
 pub struct Parameter {
-    /// As equations call it.
+    /// Its name in the equations.
     name: String,
     /// In `unit`.
     value: f64,
@@ -57,7 +57,7 @@ impl Model {
         Ok(Self { inner, library })
     }
 
-    /// The model of a robot description, with a warning of what that has and the model has not.
+    /// The model of a robot description, with a warning about anything that the model does not take over.
     fn described(
         py: Python<'_>,
         format: &str,
@@ -95,8 +95,8 @@ impl Model {
     ///
     /// Args:
     ///     path: a file, or one of `residyn.names("systems")`.
-    ///     effects: a `Library`, or folders of effect files of your own beside the built-in ones; `close_loop` then considers
-    ///         them.
+    ///     effects: a `Library`, or folders of your own effect files in addition to the built-in ones; `close_loop`
+    ///         then considers them.
     ///
     /// Returns:
     ///     The model.
@@ -129,12 +129,12 @@ impl Model {
         Ok(Self { inner, library })
     }
 
-    /// The serial chain of a URDF: every link's inertia a parameter, its value there the declared one.
+    /// The serial chain of a URDF: every link's inertia is a parameter, declared with its value in the file.
     ///
     /// Args:
     ///     path: the file.
     ///     tip: the last link; without it, the end of the longest branch.
-    ///     drive: what drives the joints, where logs hold commands: one of `residyn.names("drives")`.
+    ///     drive: what drives the joints, if logs hold commands: one of `residyn.names("drives")`.
     ///     effects: as for `read`.
     ///
     /// Returns:
@@ -144,7 +144,7 @@ impl Model {
     ///     ResidynError: a file that cannot be read or holds no serial chain, or an unknown drive.
     ///
     /// Warns:
-    ///     UserWarning: of what is read differently or not at all.
+    ///     UserWarning: about what is read differently or not at all.
     #[staticmethod]
     #[pyo3(signature = (path, *, tip=None, drive=None, effects=Effects::default()))]
     fn from_urdf(
@@ -157,12 +157,12 @@ impl Model {
         Self::described(py, "urdf", &path, tip, drive, effects)
     }
 
-    /// The serial chain of an MJCF file of MuJoCo: every link's inertia a parameter; position actuators are taken over.
+    /// The serial chain of a MuJoCo MJCF file: every link's inertia is a parameter; position actuators are adopted.
     ///
     /// Args:
     ///     path: the file.
     ///     tip: the last body; without it, the end of the longest branch.
-    ///     drive: what drives the joints, where logs hold commands: one of `residyn.names("drives")`.
+    ///     drive: what drives the joints, if logs hold commands: one of `residyn.names("drives")`.
     ///     effects: as for `read`.
     ///
     /// Returns:
@@ -172,7 +172,7 @@ impl Model {
     ///     ResidynError: a file that cannot be read or holds no serial chain, or an unknown drive.
     ///
     /// Warns:
-    ///     UserWarning: of what is read differently or not at all.
+    ///     UserWarning: about what is read differently or not at all.
     #[staticmethod]
     #[pyo3(signature = (path, *, tip=None, drive=None, effects=Effects::default()))]
     fn from_mjcf(
@@ -197,7 +197,7 @@ impl Model {
         self.inner.joints
     }
 
-    /// As a URDF or the rig calls the joints; empty where they have numbers alone.
+    /// Names of the joints in a URDF or on the rig; empty if they only have numbers.
     #[getter]
     fn joint_names(&self) -> Vec<String> {
         self.inner.joint_names.clone()
@@ -242,7 +242,7 @@ impl Model {
     /// The declared equations in LaTeX.
     ///
     /// Returns:
-    ///     An equation a text; of a chain of bodies, their form.
+    ///     One text per equation; for a chain of bodies, their form.
     fn latex(&self) -> Vec<String> {
         self.inner.latex()
     }
@@ -250,7 +250,7 @@ impl Model {
     /// Write the model file.
     ///
     /// Args:
-    ///     path: the file; one that is there is replaced.
+    ///     path: the file; an existing one is replaced.
     ///
     /// Raises:
     ///     ResidynError: a folder that cannot be written.
@@ -258,7 +258,7 @@ impl Model {
         residyn_io::files::write_whole(&path, self.inner.text.as_bytes()).or_raise()
     }
 
-    /// Read a log of this rig, of any format that is read, by the model's `[columns]`.
+    /// Read a log of this rig in any supported format, by the model's `[columns]`.
     ///
     /// Args:
     ///     path: the file, or the folder of a LeRobot data set.
@@ -278,11 +278,12 @@ impl Model {
     /// start of each, under the logged torques.
     ///
     /// Args:
-    ///     log: of a rig with as many joints.
+    ///     log: of a rig with the same number of joints.
     ///     horizon_s: length of a window in s.
     ///
     /// Returns:
-    ///     A `Prediction` a window: `time` in s, shape (rows,), and `q`, joint angles in rad (or m), shape (rows, joints).
+    ///     A `Prediction` per window: `time` in s, shape (rows,), and `q`, joint angles in rad (or m),
+    ///     shape (rows, joints).
     ///
     /// Raises:
     ///     ResidynError: a log of another rig, or a horizon that is not above zero.
@@ -303,10 +304,10 @@ impl Model {
         predictions.collect()
     }
 
-    /// The torques that the logged motion needs by the model, beside the logged ones, both low-passed.
+    /// The torques that the logged motion needs according to the model, and the logged ones, both low-passed.
     ///
     /// Args:
-    ///     log: of a rig with as many joints.
+    ///     log: of a rig with the same number of joints.
     ///
     /// Returns:
     ///     `Torques`: `time` in s, shape (rows,); `logged` and `needed` in N m (or N), shape (rows, joints).
@@ -329,12 +330,12 @@ impl Model {
     ///     torque: compare the torques that the motion needs with the logged ones as well.
     ///
     /// Returns:
-    ///     `horizons_s`, and for each of them, a number a joint: `position_rmse` and `position_median` in rad (or m),
-    ///     `velocity_rmse` in rad/s (or m/s); `windows`, `diverged`. With `torque`, `torque`: `rms` of each joint in N m (or N)
-    ///     and `relative`.
+    ///     `horizons_s`, and for each horizon, one number per joint: `position_rmse` and `position_median` in rad (or
+    ///     m), `velocity_rmse` in rad/s (or m/s); `windows`, `diverged`. With `torque`, `torque`: `rms` of each joint
+    ///     in N m (or N) and `relative`.
     ///
     /// Raises:
-    ///     ResidynError: logs that hold no window of a horizon.
+    ///     ResidynError: logs that are shorter than a horizon.
     #[pyo3(signature = (logs, horizons_s=vec![0.1, 0.5, 1.0], *, torque=false))]
     fn evaluate<'py>(
         &self,
@@ -371,8 +372,8 @@ impl Model {
     ///
     /// Args:
     ///     state: positions, then velocities, shape (2 joints,).
-    ///     tau: shape (steps, joints), or (steps,) of one joint.
-    ///     step_s: how long each is held, in s.
+    ///     tau: shape (steps, joints), or (steps,) for one joint.
+    ///     step_s: how long each torque is held, in s.
     ///     integrator: "rk4", "semi_implicit_euler" or "fine:N" for N substeps.
     ///
     /// Returns:
@@ -418,7 +419,7 @@ impl Model {
     ///
     /// Args:
     ///     format: one of `residyn.names("formats")`: "c", "onnx", "fmi3" ...
-    ///     path: the file to write; formats of several files put the others beside it.
+    ///     path: the file to write; formats with several files put the others next to it.
     ///     step_s: how long a torque is held, in s.
     ///     integrator: "rk4", "semi_implicit_euler" or "fine:N" for N substeps.
     ///
@@ -454,7 +455,7 @@ impl Model {
 }
 
 impl Model {
-    /// Whether a log is of a rig with as many joints, driven by the same.
+    /// Whether a log is of a rig with the same number of joints, driven by the same quantity.
     ///
     /// # Errors
     /// What differs.
@@ -489,7 +490,7 @@ impl Model {
     }
 }
 
-/// Whether a length of time can be one; `what` is for the message.
+/// Whether a length of time is valid; `what` is for the message.
 fn check_seconds(what: &str, seconds: f64) -> PyResult<()> {
     match seconds > 0.0 && seconds.is_finite() {
         true => Ok(()),

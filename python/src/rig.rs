@@ -21,7 +21,7 @@ use crate::log::Log;
 type Controlled<'d> = plant::Rig<'d>;
 
 self_cell!(
-    /// A rig in motion, with the equations that it is moved by.
+    /// A rig in motion, with its equations of motion.
     struct Moving {
         owner: Dynamics,
         #[not_covariant]
@@ -119,7 +119,7 @@ impl Rig {
     /// Hold a torque (or command) for a step.
     ///
     /// Args:
-    ///     tau: of each joint in N m (or N), shape (joints,).
+    ///     tau: torque of each joint in N m (or N), shape (joints,).
     ///
     /// Returns:
     ///     `Step`: the measured `state`, shape (2 joints,), and the `reward` of the step by the task.
@@ -162,13 +162,13 @@ pub fn task_of(plant: &Plant, task: Option<&Path>) -> PyResult<Task> {
 ///     plant: a plant or model file, or a built-in plant or system by its name.
 ///     effects: what its model does not declare: the value of an effect's first parameter, or of several by their names;
 ///         "coulomb_friction@2" is on joint 2.
-///     seed: of excitation and noise; the same seed gives the same log.
-///     duration_s: in place of the plant's own.
+///     seed: for excitation and noise; the same seed gives the same log.
+///     duration_s: instead of the plant's own.
 ///     name: what messages and reports call the log; by default the plant's name and the seed.
 ///     library: the effects to choose from; by default the built-in ones.
 ///
 /// Returns:
-///     What the rig's sensors said, and its torques or commands.
+///     The readings of the rig's sensors, and its torques or commands.
 ///
 /// Raises:
 ///     ResidynError: a plant or effect that is unknown, or a rig that diverges.

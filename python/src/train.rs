@@ -12,19 +12,19 @@ use crate::arrays::plain;
 use crate::error::{OrRaise, ResidynError};
 use crate::work::{Listener, interruptible};
 
-/// How many epochs of how many are done, and the loss of the last.
-type Told = (usize, usize, f64);
+/// How many epochs are done out of how many, and the loss of the last.
+type Message = (usize, usize, f64);
 
 /// Train a hybrid, physics-only or data-driven model from scratch, on logs or on a simulated plant.
 ///
-/// The same call goes on with a run that was interrupted, and ends with the same numbers.
+/// The same call resumes an interrupted run, and ends with the same numbers.
 ///
 /// Args:
 ///     config: the training recipe: a file, or a dictionary with the keys of one, where paths are relative to the working
 ///         directory.
 ///     out: the folder of the checkpoint.
 ///     seed: of everything random; the same seed gives the same result on the same machine.
-///     progress: called after each epoch with the number of epochs done, of all, and the loss.
+///     progress: called after each epoch with the number of epochs done, their total, and the loss.
 ///
 /// Returns:
 ///     Errors and parameters before and after, as `residyn train --json` prints them.
@@ -53,9 +53,9 @@ pub fn train(
 ///     checkpoint: the folder of the trained model.
 ///     out: the folder of the new checkpoint.
 ///     config: a recipe, a file or a dictionary as for `train`; or
-///     logs: files of logs, for a recipe that suits most.
+///     logs: log files, for a recipe that suits most cases.
 ///     seed: of everything random.
-///     progress: called after each epoch with the number of epochs done, of all, and the loss.
+///     progress: called after each epoch with the number of epochs done, their total, and the loss.
 ///
 /// Returns:
 ///     Errors and parameters before and after, as `train` returns them.
@@ -121,8 +121,8 @@ fn carry_out(
     out: PathBuf,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'_, PyAny>> {
-    let heard = |told: Told| match &progress {
-        Some(callback) => callback.call1(py, told).map(drop),
+    let heard = |message: Message| match &progress {
+        Some(callback) => callback.call1(py, message).map(drop),
         None => Ok(()),
     };
     let results = interruptible(
@@ -133,24 +133,24 @@ fn carry_out(
     plain(py, &results.or_raise()?)
 }
 
-/// The run in a folder from where it stands; where it is stopped, what is done is saved.
+/// Continues the run in a folder; if it is stopped, its progress is saved.
 fn trained(
     job: &Job,
     out: &Path,
-    listener: &Listener<Told>,
+    listener: &Listener<Message>,
 ) -> Result<TrainingResults, RecipeError> {
     let folder = RunFolder::open(out)?;
     let mut training = job.begin(&folder)?;
     let mut saves = Saves::new(Saves::EVERY);
     let mut failed = None;
     let mut observer = |at: &Progress<'_>| {
-        let told = listener.tell_or_stop((at.epoch, at.epochs, at.loss));
-        if told.is_break() || saves.are_due(at) {
+        let message = listener.tell_or_stop((at.epoch, at.epochs, at.loss));
+        if message.is_break() || saves.are_due(at) {
             failed = save(out, at.training, &job.origin).err();
         }
         match failed {
             Some(_) => ControlFlow::Break(()),
-            None => told,
+            None => message,
         }
     };
     training.run(&job.data.training, None, &mut observer)?;

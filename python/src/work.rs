@@ -13,32 +13,32 @@ use pyo3::prelude::*;
 /// How long Ctrl-C may go unheard.
 const LISTEN_EVERY: Duration = Duration::from_millis(50);
 
-/// How far work may run ahead of what Python has heard of it: where the progress of some epoch ends a training, the
+/// How far work may run ahead of what Python has heard of it: if the callback ends a training at some epoch, the
 /// training ends there and not long after.
 const AHEAD: usize = 16;
 
 /// How long to wait for work that is to stop, so that Ctrl-C has its effect within a second.
 const GRACE: Duration = Duration::from_millis(800);
 
-/// What long work tells of its progress to.
+/// Receives the progress of long work.
 #[derive(Clone)]
 pub struct Listener<M> {
     messages: SyncSender<M>,
     stopped: Arc<AtomicBool>,
 }
 
-/// What unwinds the thread of work that nobody waits for any more. No message is printed.
+/// Unwinds the thread of work that nobody waits for any more. No message is printed.
 struct Stopped;
 
 impl<M> Listener<M> {
-    /// Tell of progress; does not return where the work is to stop.
+    /// Report progress; does not return if the work is to stop.
     pub fn tell(&self, message: M) {
         if self.tell_or_stop(message).is_break() {
             resume_unwind(Box::new(Stopped));
         }
     }
 
-    /// Tell of progress, and hear whether to go on; waits where Python is far behind.
+    /// Report progress, and hear whether to go on; waits if Python is far behind.
     pub fn tell_or_stop(&self, message: M) -> ControlFlow<()> {
         match !self.stopped.load(Ordering::Relaxed) && self.messages.send(message).is_ok() {
             true => ControlFlow::Continue(()),
@@ -47,10 +47,10 @@ impl<M> Listener<M> {
     }
 }
 
-/// Work on a thread of its own without the interpreter's lock; `heard` gets what it tells, with the lock.
+/// Work on a separate thread without the interpreter's lock; `heard` receives its messages, with the lock.
 ///
-/// Where a signal comes (Ctrl-C), or `heard` raises, the work ends at the next thing that it tells, and this returns then, or
-/// without it where that takes long.
+/// On a signal (Ctrl-C), or if `heard` raises, the work ends at its next message, and this returns then, or without
+/// waiting for it if that takes long.
 pub fn interruptible<T, M>(
     py: Python<'_>,
     work: impl FnOnce(&Listener<M>) -> T + Send + 'static,

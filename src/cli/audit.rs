@@ -3,19 +3,20 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 
-use super::{Answer, Common, inputs, remedy, voice};
-use residyn_core::data::{Audit, Columns, Log, Severity, audit_together, tell_repeats};
+use super::{Answer, Common, inputs, remedy, terminal};
+use residyn_core::data::{Audit, Columns, Log, Severity, audit_together, report_repeats};
 use residyn_core::model::Library;
 use residyn_io::read_model;
 use residyn_io::read_standard_log;
 
-/// Audit logs: units, signs, sampling, noise, jumps, lags, excitation, what they cannot show, and what mends them
+/// Audit logs: units, signs, sampling, noise, jumps, lags, excitation, what they cannot show, and how to fix them
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Exit status 1 where a finding is serious.\n\nExample:\n  residyn audit run1.csv run2.csv"
+    after_help = "Exit status 1 if a finding is serious.\n\nExample:\n  residyn audit run1.csv run2.csv"
 )]
 pub(super) struct Arguments {
-    /// Model file, or the name of a built-in system, for names and units of columns; without it, logs have the standard ones
+    /// Model file, or the name of a built-in system, for names and units of columns; without it, the standard ones are
+    /// assumed
     #[arg(long)]
     model: Option<PathBuf>,
     /// Logs to audit
@@ -26,16 +27,16 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let (logs, columns) = voice::stage("reading the logs", || read(arguments))?;
+    let (logs, columns) = terminal::stage("reading the logs", || read(arguments))?;
     inputs::print_notes(&logs);
     let mut audits = audit_together(&logs, &columns);
-    tell_repeats(&logs, &mut audits);
+    report_repeats(&logs, &mut audits);
     if arguments.common.json {
-        voice::print(&(serde_json::to_string_pretty(&audits)? + "\n"))?;
+        terminal::print(&(serde_json::to_string_pretty(&audits)? + "\n"))?;
     } else {
         for audit in &audits {
-            let text = audit.told(&|remedy| format!("paste: {}", remedy::of_finding(remedy)));
-            voice::answer(headline(audit), &format!("{text}\n"))?;
+            let text = audit.message(&|remedy| format!("paste: {}", remedy::of_finding(remedy)));
+            terminal::answer(headline(audit), &format!("{text}\n"))?;
         }
     }
     let serious = audits.iter().any(|audit| audit.serious().next().is_some());

@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::call::{Begun, files};
 use super::shard::{self, Sharding, program_id};
-use super::{Answer, Common, interrupt, progress, told, voice};
+use super::{Answer, Common, interrupt, message, progress, terminal};
 use residyn_core::model::Library;
 use residyn_io::files::content_id;
 use residyn_io::runs::{Identity, Lines, RunFolder};
@@ -101,7 +101,7 @@ fn effects(arguments: &Effects) -> Result<Answer> {
         call: &begun.call(&files("grid", std::slice::from_ref(&arguments.grid))?),
     };
     page.write(&folder)?;
-    voice::print(if arguments.common.json { &json } else { &text })?;
+    terminal::print(if arguments.common.json { &json } else { &text })?;
     Ok(Answer::Yes)
 }
 
@@ -118,7 +118,7 @@ fn wanted(arguments: &Effects) -> Result<Vec<Cell>> {
     Ok(all)
 }
 
-/// What decides the results of all cells, in few words: each of a thousand parts keeps it.
+/// What decides the results of all cells, kept short: each of a thousand parts stores it.
 fn identity(cells: &[Cell]) -> Result<Identity> {
     let each: Vec<String> = cells.iter().map(configuration).collect::<Result<_>>()?;
     let all = content_id(each.concat().as_bytes());
@@ -164,7 +164,7 @@ impl Store {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        voice::took("closing the loops", begun);
+        terminal::took("closing the loops", begun);
         Ok(lines)
     }
 
@@ -182,7 +182,7 @@ impl Store {
             settled = cell.settled(library)?;
             settled.run(library)
         });
-        let findings = findings.and_then(|findings| findings.map_err(|error| told(&error)));
+        let findings = findings.and_then(|findings| findings.map_err(|error| message(&error)));
         let line = Line {
             configuration: configuration(cell)?,
             program: self.program.clone(),

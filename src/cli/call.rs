@@ -34,7 +34,7 @@ impl Begun {
     }
 }
 
-/// Files read in one role. Names of what is built in are not among them.
+/// Files read in one role. Names of built-in files are not among them.
 pub(super) fn files(role: &str, paths: &[PathBuf]) -> Result<Vec<InputFile>> {
     let read = |path: &Path| {
         let name = path.display();

@@ -5,12 +5,12 @@ use anyhow::Result;
 use clap::Args;
 use serde_json::json;
 
-use super::{Answer, Common, inputs, voice};
+use super::{Answer, Common, inputs, terminal};
 
-/// Check model files: parameters and inputs that nothing uses, mass matrix, units, names that mislead
+/// Check model files: unused parameters and inputs, mass matrix, units, misleading names
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Exit status 1 where something is found, 2 where a file cannot be read.\n\nExample:\n  residyn check arm.toml"
+    after_help = "Exit status 1 if something is found, 2 if a file cannot be read.\n\nExample:\n  residyn check arm.toml"
 )]
 pub(super) struct Arguments {
     /// Model files, or names of built-in systems
@@ -39,12 +39,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             value
         });
         let values: Vec<_> = values.collect();
-        voice::print(&(serde_json::to_string_pretty(&values)? + "\n"))?;
+        terminal::print(&(serde_json::to_string_pretty(&values)? + "\n"))?;
     } else {
         for (path, check) in named() {
             let path = path.display();
             let headline = format!("{path}: {} finding(s)", check.findings.len());
-            voice::answer(headline, &format!("{path}: {check}\n"))?;
+            terminal::answer(headline, &format!("{path}: {check}\n"))?;
         }
     }
     let is_clean = checks.iter().all(|check| check.findings.is_empty());

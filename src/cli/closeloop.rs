@@ -12,9 +12,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::call::{Begun, files};
-use super::{Answer, Common, inputs, interrupt, progress, remedy, voice};
+use super::{Answer, Common, inputs, interrupt, progress, remedy, terminal};
 use residyn_core::closeloop::{
-    Calibrator, Outcome, Reference, Request, Settings, Space, Split, Verdict, prepare, solve,
+    Calibrator, ErrorModel, Outcome, Reference, Request, Settings, Split, Verdict, prepare, solve,
 };
 use residyn_core::data::{LeaveOut, Log};
 use residyn_core::model::InputFile;
@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     /// Logs to learn from
     #[arg(long, num_args = 1.., value_name = "LOG", requires = "model")]
     train: Vec<PathBuf>,
-    /// Logs to judge by; without them, the last logs or the end of each are set apart
+    /// Logs to test on; without them, the last logs or the end of each log are set apart
     #[arg(long, num_args = 1.., value_name = "LOG", requires = "train")]
     test: Vec<PathBuf>,
     /// Other models of the same rig to score as they are, without a fit: files or names of built-in systems
@@ -51,15 +51,15 @@ pub(super) struct Arguments {
     #[arg(long, num_args = 1.., value_name = "LOG@T0-T1")]
     leave_out: Vec<LeaveOut>,
     /// Afterwards repeat the search on this many simulations of the accepted model: how often does it name an effect
-    /// where there is none, and how small an effect would it name? Takes about as long as so many runs; the same command
-    /// goes on with those of an interrupted run
+    /// that is absent, and how small an effect would it name? Takes about as long as that many runs; the same command
+    /// resumes an interrupted calibration
     #[arg(long, num_args = 0..=1, default_missing_value = "20", value_name = "RUNS", value_parser = inputs::count)]
     calibrate: Option<NonZeroUsize>,
-    /// Time after which the search for effects stops where it stands, and the report says so: 90s, 10min, 2h
+    /// Time after which the search for effects stops as it stands, and the report says so: 90s, 10min, 2h
     #[arg(long, value_name = "TIME", default_value = "10min", value_parser = humantime::parse_duration)]
     budget: Duration,
-    /// Which errors to compare: of the open-loop motion, or of the torques that the logged motion needs. Without it, those
-    /// that say more about these logs
+    /// Which errors to compare: of the open-loop motion, or of the torques that the logged motion needs. Without it,
+    /// whichever say more about these logs
     #[arg(long, value_enum)]
     errors: Option<Errors>,
     /// Draw curves of the error below the answer, as is done on a terminal that shows UTF-8
@@ -78,16 +78,16 @@ enum Errors {
     Torque,
 }
 
-impl From<Errors> for Space {
+impl From<Errors> for ErrorModel {
     fn from(errors: Errors) -> Self {
         match errors {
-            Errors::Motion => Self::Motion,
-            Errors::Torque => Self::Torque,
+            Errors::Motion => Self::OutputError,
+            Errors::Torque => Self::InverseDynamics,
         }
     }
 }
 
-/// With more free parameters than this a model takes minutes.
+/// With more free parameters than this, a fit takes minutes.
 const MANY_PARAMETERS: usize = 150;
 
 /// The demo rig: its plant file is embedded, so that the program needs nothing but itself.
@@ -98,7 +98,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
     let (declared, split) = match &arguments.model {
-        Some(model) => voice::stage("reading the logs", || measured(arguments, model, &library))?,
+        Some(model) => {
+            terminal::stage("reading the logs", || measured(arguments, model, &library))?
+        }
         None => demo(&library, &mut rng)?,
     };
     let against = references(&arguments.against, &declared, &library)?;
@@ -116,7 +118,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let mut request = Request::new(&declared, &library, split);
     request.against = against;
     request.learner = Some(&learner);
-    request.space = arguments.errors.map(Space::from);
+    request.error_model = arguments.errors.map(ErrorModel::from);
     let prepared = prepare(request, &stages);
     stages.beside(|| inputs::print_faults(prepared.audits()));
     let mut outcome = solve(&prepared, &mut rng, &stages)?;
@@ -132,7 +134,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             Ok::<_, anyhow::Error>(report)
         })
     };
-    let mut report = voice::stage("writing the report", || write(&outcome))?;
+    let mut report = terminal::stage("writing the report", || write(&outcome))?;
     if let Some(runs) = arguments.calibrate {
         // The report is safe before the long work begins.
         let problem = outcome.problem(&declared, &library);
@@ -145,9 +147,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         kept.remove()?;
     }
     if arguments.common.json {
-        voice::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
+        terminal::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
     } else {
-        let curves = match arguments.curves || voice::shows_curves() {
+        let curves = match arguments.curves || terminal::shows_curves() {
             true => report::curves(&report),
             false => Vec::new(),
         };
@@ -156,7 +158,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             predict: &remedy::prediction,
         };
         let summary = report::summary(&report, &outcome.seconds, &arguments.out, &curves, &words);
-        voice::answer(report::answer(&report), &summary)?;
+        terminal::answer(report::answer(&report), &summary)?;
     }
     Ok(answer(&outcome))
 }
@@ -166,7 +168,7 @@ fn kept(out: &Path, written: &Arc<AtomicBool>) -> impl Fn() -> String + Send + '
     let (out, written) = (out.display().to_string(), Arc::clone(written));
     move || match written.load(Ordering::SeqCst) {
         false => "nothing was written".to_owned(),
-        true => format!("{out} has the report as it was written last"),
+        true => format!("{out} has the report as last written"),
     }
 }
 
@@ -174,9 +176,9 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(M
     let declared = read_model(model, library)?;
     inputs::print_findings(model, &declared, arguments.common.seed);
     if declared.free_parameters() > MANY_PARAMETERS {
-        voice::say(format!(
-            "note: {}: {} free parameters are fitted at once; the time of a fit grows with the cube of their number, and is \
-             less where those that are known are `fixed = true`",
+        terminal::say(format!(
+            "note: {}: {} free parameters are fitted at once; the time of a fit grows with the cube of their number; \
+             set `fixed = true` for those that are known",
             model.display(),
             declared.free_parameters()
         ));
@@ -187,8 +189,8 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(M
     let logs = || train.iter().chain(&test);
     inputs::print_notes(logs());
     for log in logs().filter(|log| log.is_long()) {
-        voice::say(format!(
-            "note: {}: a part of its {} rows is fitted, see the report",
+        terminal::say(format!(
+            "note: {}: only a part of its {} rows is fitted; see the report",
             log.name(),
             log.rows()
         ));
@@ -211,7 +213,7 @@ fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(Model, Split)> {
     let logs = (0..plant.recording.logs)
         .map(record)
         .collect::<Result<Vec<_>>>()?;
-    // What the plant hides stays with the plant: the loop gets the declared model and the logs.
+    // The loop gets only the declared model and the logs: the plant keeps the effects that it hides.
     Ok((
         plant.declared(),
         Split::of(logs, &Settings::default().split),
@@ -281,7 +283,7 @@ fn origin(arguments: &Arguments, declared: &Model) -> Origin {
             "leave_out": spans.collect::<Vec<_>>(),
             "effects": paths(&arguments.effects.folders),
             "calibrate": arguments.calibrate,
-            "errors": arguments.errors.map(Space::from),
+            "errors": arguments.errors.map(ErrorModel::from),
             "budget": humantime::format_duration(arguments.budget).to_string(),
             "device": arguments.common.device.name(),
         }),
@@ -291,7 +293,7 @@ fn origin(arguments: &Arguments, declared: &Model) -> Origin {
     }
 }
 
-/// "No" where nothing could be named although something is missing, or nothing could be said.
+/// "No" if something is missing that could not be named, or if no verdict is possible.
 fn answer(outcome: &Outcome) -> Answer {
     match outcome.verdict {
         Verdict::Explained | Verdict::PartlyExplained | Verdict::NoMissingEffect => Answer::Yes,

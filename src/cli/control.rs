@@ -8,7 +8,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{self, Source};
-use super::{Answer, Common, progress, voice};
+use super::{Answer, Common, progress, terminal};
 use residyn_control::control::{
     Controller, Episode, Policy, Predictor, Task, episode, with_controller,
 };
@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     task: Option<PathBuf>,
     #[arg(long, default_value = "1", value_parser = inputs::count)]
     episodes: NonZeroUsize,
-    /// Steps of a plan that are executed before the next, instead of the task's
+    /// Steps of a plan that are executed before the next plan, instead of the task's
     #[arg(long, value_name = "STEPS")]
     replan: Option<usize>,
     /// Planner, instead of the task's; with that planner's default settings
@@ -56,7 +56,7 @@ pub(super) struct Arguments {
     /// Standard deviations of the sensors' noise: position and velocity
     #[arg(long, num_args = 2, value_name = "NUMBER")]
     noise: Option<Vec<f64>>,
-    /// Folder for each episode as a log and, where the task has a figure, as a film (SVG)
+    /// Folder for each episode as a log and, if the task has a figure, as a film (SVG)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -77,7 +77,7 @@ struct Printed {
     task: Task,
     episodes: Vec<Entry>,
     return_mean: f64,
-    /// Over episodes; 0 for one of them.
+    /// Over episodes; 0 for a single one.
     return_std: f64,
     /// Episodes in which the goal held until the end.
     successes: usize,
@@ -92,7 +92,7 @@ struct Entry {
     ms_per_decision: f64,
     /// Candidates of all plans whose rollout diverged.
     diverged: usize,
-    /// When plans were made of which all candidates diverged, in s.
+    /// When plans were made whose candidates all diverged, in s.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lost_s: Vec<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -130,10 +130,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         bar.set_message("episodes");
     }
     bar.finish_and_clear();
-    voice::took("controlling the plant", begun);
+    terminal::took("controlling the plant", begun);
     let printed = Printed::new(arguments, task, entries);
     if arguments.common.json {
-        voice::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
+        terminal::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
     } else {
         let Printed {
             return_mean,
@@ -142,16 +142,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         } = printed;
         let headline =
             format!("return {return_mean:.2}; {successes} of {count} episode(s) succeed");
-        voice::answer(headline, &table(&printed))?;
+        terminal::answer(headline, &table(&printed))?;
     }
-    Ok(match told_of_lost(&printed.episodes) {
+    Ok(match lost_message(&printed.episodes) {
         true => Answer::No,
         false => Answer::Yes,
     })
 }
 
-/// Say in which episode a plan first had no candidate of a finite return; whether there is one.
-fn told_of_lost(episodes: &[Entry]) -> bool {
+/// Say in which episode a plan first had no candidate with a finite return; returns whether there is such a plan.
+fn lost_message(episodes: &[Entry]) -> bool {
     let firsts = episodes.iter().enumerate();
     let mut firsts = firsts.filter_map(|(number, e)| Some((number, e.lost_s.first()?)));
     let Some((number, first_s)) = firsts.next() else {
@@ -159,9 +159,9 @@ fn told_of_lost(episodes: &[Entry]) -> bool {
     };
     let lost: usize = episodes.iter().map(|e| e.lost_s.len()).sum();
     let plans: usize = episodes.iter().map(|e| e.decisions).sum();
-    voice::tell(format!(
-        "warning: {lost} of {plans} plan(s) are none, the first in episode {number} at {first_s:.3} s: no candidate has a finite \
-         return; mend the model or the objective of the task, or shorten the planner's horizon"
+    terminal::tell(format!(
+        "warning: {lost} of {plans} plan(s) failed, the first in episode {number} at {first_s:.3} s: no candidate has \
+         a finite return; fix the model or the objective of the task, or shorten the planner's horizon"
     ));
     true
 }

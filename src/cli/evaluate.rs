@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::inputs::{self, Source};
 use super::status::NotFinite;
-use super::{Answer, Common, voice};
+use super::{Answer, Common, terminal};
 use residyn_core::data::{Joint, LeaveOut, Log, audit_together};
 use residyn_core::identify::calibrate;
 use residyn_core::model::{Dynamics, Model};
@@ -54,7 +54,7 @@ struct Printed {
     #[serde(skip_serializing_if = "Option::is_none")]
     torque: Option<TorqueError>,
     logs: Vec<LogEntry>,
-    /// Estimated sensor offsets (rad or m), one list a log.
+    /// Estimated sensor offsets (rad or m), one list per log.
     #[serde(skip_serializing_if = "Option::is_none")]
     offsets: Option<Vec<Vec<f64>>>,
     integrator_step_s: f64,
@@ -76,7 +76,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         bail!("--horizon {bad}: a horizon is a number of seconds above zero");
     }
     let (declared, dynamics) = model(arguments)?;
-    let mut logs = voice::stage("reading the logs", || {
+    let mut logs = terminal::stage("reading the logs", || {
         inputs::logs(&arguments.test, &declared)
     })?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
@@ -98,7 +98,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         .transpose()?;
     let dynamics = offsets.as_ref().map_or(&dynamics, |found| &found.dynamics);
     let assess = || assess(dynamics, &logs, &arguments.horizon);
-    let assessment = voice::stage("predicting", assess);
+    let assessment = terminal::stage("predicting", assess);
     let summary = summarise(&assessment.horizons, declared.joints);
     if let Some(h) = summary.windows.iter().position(|count| *count == 0) {
         bail!(
@@ -127,10 +127,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             integrator_step_s: assessment.step_s,
             integrator_error: assessment.step_error,
         };
-        voice::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
+        terminal::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
     } else {
         let torque = torque.as_ref().map_or_else(String::new, torques);
-        voice::answer(headline(&summary), &(table(&summary) + &torque))?;
+        terminal::answer(headline(&summary), &(table(&summary) + &torque))?;
     }
     Ok(Answer::Yes)
 }
@@ -168,8 +168,8 @@ fn torque(model: &Model, logs: &[Log]) -> Result<TorqueError> {
             format!(", first in {log} at {time_s:.3} s")
         });
         bail!(NotFinite(format!(
-            "--torque: the torques that {} needs, or their squares, are no finite numbers{place}; `residyn check` shows \
-             what in the model cannot be meant",
+            "--torque: the torques that {} needs, or their squares, are not finite{place}; `residyn check` shows what \
+             is implausible in the model",
             model.name
         )));
     }

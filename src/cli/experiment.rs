@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::call::{Begun, files};
 use super::shard::{self, Sharding};
-use super::{Answer, Common, command_line, inputs, interrupt, progress, voice};
+use super::{Answer, Common, command_line, inputs, interrupt, progress, terminal};
 use residyn_core::model::Library;
 use residyn_experiments::experiment::undeclared_effect::{self, Trial};
 use residyn_experiments::experiment::{Config, Experiment, FinishedRound, Session, picture};
@@ -47,7 +47,7 @@ enum Name {
     UndeclaredEffect,
 }
 
-/// The file with the time so far, s: no result, and therefore not put together from parts.
+/// The file with the time so far, s: not a result, and therefore not merged from parts.
 const WALL: &str = ".wall_s";
 
 /// What was done.
@@ -117,8 +117,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         .map(|path| format!("{}\n", path.display()))
         .collect();
     match arguments.common.json {
-        true => voice::print(&finished.json)?,
-        false => voice::answer(&finished.headline, &(finished.text + &paths))?,
+        true => terminal::print(&finished.json)?,
+        false => terminal::answer(&finished.headline, &(finished.text + &paths))?,
     }
     Ok(finished.answer)
 }
@@ -150,7 +150,7 @@ fn published(
     }
     let results = session.carry_out(experiment, clock.folder, &observer);
     bar.finish_and_clear();
-    voice::took("learning and judging", begun);
+    terminal::took("learning and judging", begun);
     let results = results?.finished(command_line(), clock.wall_s());
     Ok(Done::Whole(Finished {
         what: format!("{}, {}", results.experiment, results.task),
@@ -164,7 +164,7 @@ fn published(
     }))
 }
 
-/// What of a run is to be done.
+/// The part of a run to do.
 fn shard_of(part: &Option<Part>) -> Shard {
     part.as_ref().map_or(Shard::WHOLE, Part::shard)
 }
@@ -190,7 +190,7 @@ fn undeclared_effect(arguments: &Arguments, library: Library, clock: &Clock<'_>)
     }
     let outcome = session.run(clock.folder, &observer);
     bar.finish_and_clear();
-    voice::took("trials", begun);
+    terminal::took("trials", begun);
     let outcome = outcome?;
     let mut value = serde_json::to_value(&outcome)?;
     value["experiment"] = "undeclared-effect".into();
@@ -238,7 +238,7 @@ impl<'f> Clock<'f> {
             Some(text) => text
                 .trim()
                 .parse()
-                .map_err(|_| folder.damaged(WALL, "it is no number of seconds".to_owned()))?,
+                .map_err(|_| folder.damaged(WALL, "it is not a number of seconds".to_owned()))?,
             None => 0.0,
         };
         Ok(Self {

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
-use super::{Answer, Common, voice};
+use super::{Answer, Common, terminal};
 use crate::exported_task;
 use residyn_core::limits::SUBSTEPS;
 use residyn_core::model::Library;
@@ -32,11 +32,11 @@ pub(super) struct Arguments {
     /// Format; `residyn list formats` shows all
     #[arg(long, value_parser = find, required_unless_present = "into")]
     format: Option<&'static Format>,
-    /// In place of a format: the URDF or MJCF that the model was made from, written again with the model's inertias, damping
-    /// and friction. All else in it stays as it is
+    /// Instead of a format: the URDF or MJCF that the model was made from, rewritten with the model's inertias, damping
+    /// and friction. Everything else in it stays as it is
     #[arg(long, value_name = "FILE", conflicts_with_all = ["format", "checkpoint", "step", "integrator"])]
     into: Option<PathBuf>,
-    /// Of --into: the last link, as `residyn new` was given it
+    /// With --into: the last link, as given to `residyn new`
     #[arg(long, value_name = "LINK", requires = "into")]
     tip: Option<String>,
     /// Output path
@@ -70,14 +70,14 @@ fn write(arguments: &Arguments, format: &'static Format) -> Result<Answer> {
     let task = exported_task(model.name());
     let model = model.with_task(task);
     let not_carried = (format.not_carried)(&model);
-    if let Some(told) = told_of_steps(&model, arguments)? {
-        voice::say(told);
+    if let Some(message) = steps_message(&model, arguments)? {
+        terminal::say(message);
     }
     prepare(arguments, &not_carried)?;
-    let files = voice::stage("writing", || format.write(&model, &arguments.out))?;
+    let files = terminal::stage("writing", || format.write(&model, &arguments.out))?;
     let compare = || measure(format, &model, arguments);
-    let measured = voice::stage("comparing with a client of the format", compare);
-    voice::print(&match arguments.common.json {
+    let measured = terminal::stage("comparing with a client of the format", compare);
+    terminal::print(&match arguments.common.json {
         true => format!("{:#}\n", printed(format, &files, &not_carried, &measured)),
         false => text(format, &files, &measured, model.step_s),
     })?;
@@ -91,8 +91,8 @@ fn write(arguments: &Arguments, format: &'static Format) -> Result<Answer> {
     })
 }
 
-/// What to do where the steps are too long for the friction of a model at rest.
-fn told_of_steps(model: &ExportModel, arguments: &Arguments) -> Result<Option<String>> {
+/// What to do if the steps are too long for the friction of a model at rest.
+fn steps_message(model: &ExportModel, arguments: &Arguments) -> Result<Option<String>> {
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
     let needed = model.substeps_around_rest(&mut rng)?;
     if needed <= model.integrator.substeps() {
@@ -103,7 +103,9 @@ fn told_of_steps(model: &ExportModel, arguments: &Arguments) -> Result<Option<St
             "give --integrator fine:{needed}, or a --step of {:.1e} s",
             model.step_s / needed as f64
         ),
-        false => "give `sign_width` in the model file, over which friction reverses".to_owned(),
+        false => {
+            "give `smoothing_velocity` in the model file, over which friction reverses".to_owned()
+        }
     };
     Ok(Some(format!(
         "note: friction at rest is too steep for steps of {} s, in which the model creeps or chatters; {remedy}",
@@ -111,7 +113,7 @@ fn told_of_steps(model: &ExportModel, arguments: &Arguments) -> Result<Option<St
     )))
 }
 
-/// Write a robot description again, with the values of a model that was made from it.
+/// Rewrite a robot description with the values of a model that was made from it.
 fn write_into(arguments: &Arguments, file: &Path) -> Result<Answer> {
     let Source::File(model) = arguments.model.source() else {
         unreachable!("clap refuses a checkpoint beside --into");
@@ -121,7 +123,7 @@ fn write_into(arguments: &Arguments, file: &Path) -> Result<Answer> {
     prepare(arguments, &not_carried)?;
     write_whole(&arguments.out, text.as_bytes())?;
     let (out, into) = (arguments.out.display(), file.display());
-    voice::print(&match arguments.common.json {
+    terminal::print(&match arguments.common.json {
         true => format!(
             "{:#}\n",
             json!({"into": file, "out": arguments.out, "not_carried": not_carried})
@@ -134,7 +136,7 @@ fn write_into(arguments: &Arguments, file: &Path) -> Result<Answer> {
 /// Say what is not carried, and make the folder of the output.
 fn prepare(arguments: &Arguments, not_carried: &[String]) -> Result<()> {
     for what in not_carried {
-        voice::say(format!("not carried: {what}"));
+        terminal::say(format!("not carried: {what}"));
     }
     let folder = folder_of(&arguments.out);
     Ok(std::fs::create_dir_all(folder).map_err(OutputError::of(folder))?)
@@ -152,8 +154,8 @@ fn measure(
     own.check_finite(&samples)?;
     let (own, lost) = own.without_lost_rollout();
     if let Some(step) = lost {
-        voice::say(format!(
-            "note: the rollout leaves the finite numbers in step {} of {:?} s and is not compared",
+        terminal::say(format!(
+            "note: the rollout is no longer finite in step {} of {:?} s and is not compared",
             step + 1,
             samples.step_s
         ));

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
-use super::{Answer, Common, interrupt, progress, voice};
+use super::{Answer, Common, interrupt, progress, terminal};
 use residyn_io::runs::RunFolder;
 use residyn_train::recipe::{Change, Job, Saves};
 use residyn_train::{Progress, Training, save};
@@ -20,7 +20,7 @@ pub(super) struct Saving {
     /// Folder of the checkpoint; a run that was interrupted is resumed from its last checkpoint
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Epochs between checkpoints; one is also written when 10 s have passed
+    /// Epochs between checkpoints; one is also written after 10 s
     #[arg(long, default_value_t = Saves::EVERY, value_name = "EPOCHS")]
     save_every: NonZeroUsize,
 }
@@ -40,27 +40,27 @@ impl Saving {
 pub(super) fn carry_out(job: &Job, dir: &Path, saving: &Saving, common: &Common) -> Result<Answer> {
     let folder = RunFolder::open(dir)?;
     for note in &job.data.notes {
-        voice::say(format!("note: {note}"));
+        terminal::say(format!("note: {note}"));
     }
     let mut training = job.begin(&folder)?;
     if training.epoch() > 0 {
-        voice::say(format!(
-            "note: {} goes on from epoch {}",
+        terminal::say(format!(
+            "note: {} resumes from epoch {}",
             dir.display(),
             training.epoch()
         ));
     }
-    voice::stage("training", || run(job, &mut training, &folder, saving))?;
+    terminal::stage("training", || run(job, &mut training, &folder, saving))?;
     let results = job.results(&training, dir)?;
     if common.json {
-        voice::print(&(serde_json::to_string_pretty(&results)? + "\n"))?;
+        terminal::print(&(serde_json::to_string_pretty(&results)? + "\n"))?;
     } else {
         let headline = format!("checkpoint: {}", dir.display());
-        voice::answer(headline, &results.text())?;
+        terminal::answer(headline, &results.text())?;
     }
     if results.is_worse() {
         let Change { before, after } = results.error;
-        voice::tell(format!(
+        terminal::tell(format!(
             "warning: the training made the prediction error larger, from {before:.3e} to {after:.3e}; lower the learning rates"
         ));
         return Ok(Answer::No);
@@ -99,7 +99,7 @@ fn run(job: &Job, training: &mut Training, folder: &RunFolder, saving: &Saving) 
     }
 }
 
-/// What Ctrl-C leaves of a training of so many epochs.
+/// What Ctrl-C leaves of a training of `of` epochs.
 fn kept_epochs(dir: &Path, kept: &Arc<AtomicUsize>, of: usize) -> impl Fn() -> String + use<> {
     let (dir, kept) = (dir.display().to_string(), Arc::clone(kept));
     move || match kept.load(Ordering::SeqCst) {

@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 use serde_json::json;
 
-use super::{Answer, Common, inputs, voice};
+use super::{Answer, Common, inputs, terminal};
 use crate::save_imported;
 use residyn_formats::Imported;
 use residyn_io::runs::RunFolder;
@@ -13,7 +13,7 @@ use residyn_io::runs::RunFolder;
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  residyn import --file pendulum.json --out pendulum")]
 pub(super) struct Arguments {
-    /// The JSON file; the weights that it names are beside it
+    /// The JSON file; the weights that it names are next to it
     #[arg(long, value_name = "JSON")]
     file: PathBuf,
     /// Folder of the checkpoint
@@ -36,7 +36,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let _folder = RunFolder::open(&arguments.out)?;
     save_imported(&arguments.out, imported, seed, device)?;
     let out = arguments.out.display();
-    voice::print(&match arguments.common.json {
+    terminal::print(&match arguments.common.json {
         true => {
             let json = json!({"system": system, "written_by": by, "checkpoint": arguments.out});
             serde_json::to_string_pretty(&json)? + "\n"

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 
-use super::{remedy, voice};
+use super::{remedy, terminal};
 use residyn_core::data::{Audit, LeaveOut, Log, leave_out};
 use residyn_core::limits::RUNS;
 use residyn_core::model::check::Severity;
@@ -18,7 +18,7 @@ use residyn_io::with_effects_in;
 /// The effects that model files may name: the built-in ones and the user's own.
 #[derive(Debug, Args)]
 pub(super) struct Effects {
-    /// Folders of your own effect files
+    /// Folders with your own effect files
     #[arg(long = "effects", num_args = 1.., value_name = "DIR")]
     pub folders: Vec<PathBuf>,
 }
@@ -95,14 +95,14 @@ pub(super) fn leave_out(
     Ok(())
 }
 
-/// Print on standard error what in a model cannot be meant, before anything is computed with it.
+/// Print on standard error what is implausible in a model, before anything is computed with it.
 pub(super) fn print_findings(path: &Path, model: &Model, seed: u64) {
     for finding in model.check(&mut residyn_core::rng(seed)).findings {
         let label = match finding.severity {
             Severity::Error => "serious",
             Severity::Warning => "warning",
         };
-        voice::say(format!("{label}: {}: {finding}", path.display()));
+        terminal::say(format!("{label}: {}: {finding}", path.display()));
     }
 }
 
@@ -110,7 +110,7 @@ pub(super) fn print_findings(path: &Path, model: &Model, seed: u64) {
 pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
     for log in logs {
         for note in &log.notes {
-            voice::say(format!("note: {}: {note}", log.name()));
+            terminal::say(format!("note: {}: {note}", log.name()));
         }
     }
 }
@@ -119,8 +119,8 @@ pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
 pub(super) fn print_faults<'a>(audits: impl IntoIterator<Item = &'a Audit>) {
     for audit in audits {
         for finding in audit.serious() {
-            let told = finding.told(&remedy::of_finding);
-            voice::say(format!("serious: {}: {told}", audit.log));
+            let message = finding.message(&remedy::of_finding);
+            terminal::say(format!("serious: {}: {message}", audit.log));
         }
     }
 }

@@ -8,7 +8,7 @@ use std::thread;
 
 use indicatif::ProgressBar;
 
-use super::{command_line, voice};
+use super::{command_line, terminal};
 use residyn_io::runs::RunFolder;
 
 /// As shells report a program that Ctrl-C ended.
@@ -20,12 +20,12 @@ struct Run {
     says: Box<dyn Fn() -> String + Send>,
 }
 
-/// The run that is interrupted; locked while something is written that has to be whole.
+/// The run to interrupt; locked while something is written that must be complete.
 static RUN: Mutex<Option<Run>> = Mutex::new(None);
 static HANDLER: Once = Once::new();
 static HIT: AtomicBool = AtomicBool::new(false);
 
-/// While it exists, Ctrl-C ends the run in a folder in an orderly way. Then it does what it did before.
+/// While it exists, Ctrl-C ends the run in a folder in an orderly way. Afterwards Ctrl-C does what it did before.
 pub(super) struct Orderly {
     before: Option<Run>,
 }
@@ -47,7 +47,7 @@ impl Drop for Orderly {
     }
 }
 
-/// The same in a folder that keeps whatever a bar counts, `rounds` say.
+/// As above, in a folder that keeps whatever a bar counts, `rounds` say.
 pub(super) fn counted(folder: &RunFolder, bar: &ProgressBar, what: &'static str) -> Orderly {
     let (path, bar) = (folder.path().display().to_string(), bar.clone());
     orderly(folder, move || {
@@ -56,12 +56,12 @@ pub(super) fn counted(folder: &RunFolder, bar: &ProgressBar, what: &'static str)
     })
 }
 
-/// How a run is taken up again.
+/// How to resume a run.
 pub(super) fn go_on() -> String {
-    format!("to go on from there, type again\n  {}", command_line())
+    format!("to resume from there, run again\n  {}", command_line())
 }
 
-/// Do what Ctrl-C waits for.
+/// Do work that Ctrl-C has to wait for.
 pub(super) fn whole<T>(work: impl FnOnce() -> T) -> T {
     let _run = run();
     work()
@@ -80,9 +80,9 @@ fn end() {
     if let Some(Run { folder, says }) = &*run {
         if io::stderr().is_terminal() {
             // Below the bar.
-            voice::tell("");
+            terminal::tell("");
         }
-        voice::tell(format!("interrupted: {}", says()));
+        terminal::tell(format!("interrupted: {}", says()));
         folder.leave();
     }
     process::exit(STATUS);

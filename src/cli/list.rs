@@ -5,7 +5,7 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::{Answer, Common, inputs, voice};
+use super::{Answer, Common, inputs, terminal};
 use residyn_control::control::Task;
 use residyn_core::model::{Effect, Library, Model};
 use residyn_core::plant::Plant;
@@ -45,7 +45,10 @@ const OTHERS: &[(&str, &str)] = &[
         "mcap",
         "recordings of robots, joint states in CDR or JSON, in",
     ),
-    ("rosbag2", "the same as .db3 files and folders of ROS 2, in"),
+    (
+        "rosbag2",
+        "recordings of ROS 2 as .db3 files and folders, in",
+    ),
     ("parquet", "logs, and data sets of LeRobot, in"),
     (
         "toml",
@@ -69,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         What::Formats => formats(),
     };
     let json = serde_json::to_string_pretty(&value)? + "\n";
-    voice::print(if arguments.common.json { &json } else { &text })?;
+    terminal::print(if arguments.common.json { &json } else { &text })?;
     Ok(Answer::Yes)
 }
 

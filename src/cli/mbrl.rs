@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::experiment::message;
-use super::{Answer, Common, inputs, interrupt, progress, voice};
+use super::{Answer, Common, inputs, interrupt, progress, terminal};
 use residyn_experiments::experiment::{Config, FinishedRound, Session};
 use residyn_experiments::mbrl::Round;
 use residyn_io::runs::RunFolder;
@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         }
     });
     bar.finish_and_clear();
-    voice::took("rounds", begun);
+    terminal::took("rounds", begun);
     let checkpoint = ended?;
     if let Some(error) = locked(&failed).take() {
         return Err(error);
@@ -80,10 +80,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let rounds = locked(&rounds);
     if common.json {
         let value = json!({"schema": 1, "out": out, "seed": common.seed, "method": method, "rounds": *rounds});
-        voice::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
+        terminal::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
     } else {
         let headline = format!("checkpoint: {}", checkpoint.display());
-        voice::answer(headline, &table(&rounds, &checkpoint))?;
+        terminal::answer(headline, &table(&rounds, &checkpoint))?;
     }
     Ok(Answer::Yes)
 }

@@ -4,14 +4,14 @@ use anyhow::Result;
 use clap::Args;
 use serde_json::json;
 
-use super::{Answer, voice};
+use super::{Answer, terminal};
 use residyn_io::runs::{Lacking, RunFolder, merge};
 
-/// Put the parts of a run together that --shard did apart, on several machines say
+/// Merge the parts of a run that --shard did separately, on several machines say
 ///
-/// Parts of other settings or of another build of the program are refused. Afterwards the command of the parts, without
-/// --shard and with this --out, finds the work done and writes its results, the same as of a run on one machine; work that is
-/// missing it would do itself. The exit status is 1 where a part is missing or not finished.
+/// Parts with other settings or from another build of the program are refused. Afterwards the command of the parts,
+/// without --shard and with this --out, finds the work done and writes its results, the same as those of a run on one
+/// machine; it would do any missing work itself. The exit status is 1 if a part is missing or not finished.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
         residyn bench effects --shard 1/2 --out part-1\n  \
@@ -30,21 +30,21 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// "No" where the run is not whole.
+/// "No" if the run is not complete.
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let Arguments { parts, out, json } = arguments;
     let lacking = merge(parts, &RunFolder::open(out)?)?;
-    for line in told(&lacking) {
-        voice::tell(format!("warning: {line}"));
+    for line in message(&lacking) {
+        terminal::tell(format!("warning: {line}"));
     }
     if *json {
         let missing: Vec<String> = lacking.missing.iter().map(ToString::to_string).collect();
         let unfinished: Vec<_> = lacking.unfinished.iter().map(|(_, path)| path).collect();
         let value = json!({"schema": 1, "out": out, "parts": parts.len(), "missing": missing, "unfinished": unfinished});
-        voice::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
+        terminal::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
     } else {
-        let text = format!("{} parts are together in {}\n", parts.len(), out.display());
-        voice::answer(out.display(), &text)?;
+        let text = format!("{} parts are merged in {}\n", parts.len(), out.display());
+        terminal::answer(out.display(), &text)?;
     }
     Ok(match lacking == Lacking::default() {
         true => Answer::Yes,
@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     })
 }
 
-fn told(lacking: &Lacking) -> Vec<String> {
+fn message(lacking: &Lacking) -> Vec<String> {
     let rest = "merge again when it is, or let the command without --shard do the rest";
     let missing = lacking
         .missing

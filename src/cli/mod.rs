@@ -26,9 +26,9 @@ mod shell;
 mod simulate;
 mod status;
 mod sweep;
+mod terminal;
 mod train;
 mod tune;
-mod voice;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -49,7 +49,7 @@ use residyn_train::Backend;
 )]
 struct Cli {
     #[command(flatten)]
-    voice: voice::Voice,
+    verbosity: terminal::Verbosity,
     #[command(subcommand)]
     command: Command,
 }
@@ -101,7 +101,7 @@ enum Answer {
 /// The command line that the program runs on.
 static ARGUMENTS: OnceLock<Vec<OsString>> = OnceLock::new();
 
-/// The file that the program's code is in, where that is not the executable of the process.
+/// The file that holds the program's code, if that is not the executable of the process.
 static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
 
 /// [`run`], by another program that has loaded this one as the library `file`.
@@ -110,12 +110,12 @@ pub fn run_from(file: PathBuf, arguments: impl IntoIterator<Item = OsString>) ->
     run(arguments)
 }
 
-/// Run the program on a command line, the name of the program first: exit status 0 done, 1 ran and the answer is no, 2 could
-/// not run. Once in a process.
+/// Run the program on a command line, the name of the program first: exit status 0 if done, 1 if it ran and the answer
+/// is no, 2 if it could not run. Only once per process.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = ARGUMENTS.get_or_init(|| arguments.into_iter().collect());
-    let Cli { voice, command } = Cli::parse_from(arguments);
-    voice.begin();
+    let Cli { verbosity, command } = Cli::parse_from(arguments);
+    verbosity.begin();
     tell_of_panics();
     let result = match command {
         Command::Closeloop(arguments) => closeloop::run(&arguments),
@@ -143,7 +143,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Answer::Yes) => 0,
         Ok(Answer::No) => 1,
         Err(error) => {
-            voice::tell(format!("error: {}", told(&error)));
+            terminal::tell(format!("error: {}", message(&error)));
             status::status(&error)
         }
     }
@@ -168,19 +168,19 @@ fn quoted(word: &str) -> String {
 }
 
 /// An error, its causes and what to do. A cause that the message before it contains is not repeated.
-fn told(error: &anyhow::Error) -> String {
-    let mut told = String::new();
+fn message(error: &anyhow::Error) -> String {
+    let mut message = String::new();
     for cause in error.chain().map(ToString::to_string) {
-        if !told.contains(&cause) {
-            told += if told.is_empty() { "" } else { ": " };
-            told += &cause;
+        if !message.contains(&cause) {
+            message += if message.is_empty() { "" } else { ": " };
+            message += &cause;
         }
     }
     if let Some(remedy) = error.chain().find_map(remedy::remedy) {
-        told += "; ";
-        told += remedy;
+        message += "; ";
+        message += remedy;
     }
-    told
+    message
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::{Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, value_parser};
 use serde_json::json;
 
-use super::{Answer, Common, voice};
+use super::{Answer, Common, terminal};
 use residyn_formats::{FORMATS, Format, RobotReader};
 use residyn_io::files::write_whole;
 
@@ -14,11 +14,11 @@ use residyn_io::files::write_whole;
 pub(super) struct Arguments {
     #[command(flatten)]
     description: Description,
-    /// The last link of the chain (a body in MJCF); without it, the end of the longest branch. What hangs on other branches
-    /// is held where the file draws it
+    /// The last link of the chain (a body in MJCF); without it, the end of the longest branch. Other branches are held
+    /// as the file draws them
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
-    /// What drives the joints, where their logs hold commands in place of torques: one of `residyn list drives`
+    /// What drives the joints, if their logs hold commands instead of torques: one of `residyn list drives`
     #[arg(long, value_name = "NAME")]
     drive: Option<String>,
     /// The model file to write; standard output if not given
@@ -28,7 +28,7 @@ pub(super) struct Arguments {
     common: Common,
 }
 
-/// The robot description to read: one flag for each format that has them.
+/// The robot description to read: one flag per format.
 #[derive(Debug)]
 struct Description {
     reader: &'static RobotReader,
@@ -39,7 +39,7 @@ struct Description {
 fn flags() -> impl Iterator<Item = (&'static str, &'static Format, &'static RobotReader)> {
     FORMATS.iter().filter_map(|format| {
         let reader = format.robots.as_ref()?;
-        // Clap takes static names alone.
+        // Clap takes only static names.
         let flag: &'static str = format!("from-{}", format.name).leak();
         Some((flag, *format, reader))
     })
@@ -85,7 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let (model, notes) = reader.model(file, tip, drive)?;
     let text = &model.text;
     for note in &notes {
-        voice::say(format!("note: {note}"));
+        terminal::say(format!("note: {note}"));
     }
     if let Some(out) = &arguments.out {
         write_whole(out, text.as_bytes())?;
@@ -93,16 +93,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     if arguments.common.json {
         let value =
             json!({"model": text, "joints": model.joints, "notes": notes, "out": arguments.out});
-        voice::print(&format!("{value:#}\n"))?;
+        terminal::print(&format!("{value:#}\n"))?;
     } else if let Some(out) = &arguments.out {
-        voice::print(&format!(
+        terminal::print(&format!(
             "{}: model of {}, joints: {}\n",
             out.display(),
             model.name,
             model.joints
         ))?;
     } else {
-        voice::print(text)?;
+        terminal::print(text)?;
     }
     Ok(Answer::Yes)
 }

@@ -8,13 +8,13 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::voice;
+use super::terminal;
 use residyn_core::closeloop::{Fits, Progress, Stage, StageTimes, Watch};
 
-/// How often a line is written where there is no terminal.
+/// How often a line is written if there is no terminal.
 const EVERY: Duration = Duration::from_secs(10);
 
-/// A progress bar, of which lines tell where it cannot be seen.
+/// A progress bar, replaced by lines where it cannot be seen.
 pub(super) struct Bar {
     bar: ProgressBar,
     /// Ends the lines when it is dropped.
@@ -29,7 +29,7 @@ impl Deref for Bar {
     }
 }
 
-/// The progress of `steps` steps that take about as long as each other.
+/// The progress of `steps` steps that take about equally long.
 pub(super) fn bar(steps: usize) -> Bar {
     shown(steps, step_line)
 }
@@ -41,7 +41,7 @@ pub(super) fn stages() -> Bar {
 
 fn shown(steps: usize, line: fn(&ProgressBar) -> String) -> Bar {
     let bar = ProgressBar::new(steps as u64);
-    if voice::is_quiet() {
+    if terminal::is_quiet() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
     let style =
@@ -61,7 +61,7 @@ fn lines(bar: ProgressBar, line: fn(&ProgressBar) -> String) -> Sender<()> {
     let (sender, ended) = mpsc::channel();
     thread::spawn(move || {
         while ended.recv_timeout(EVERY) == Err(RecvTimeoutError::Timeout) {
-            voice::say(line(&bar));
+            terminal::say(line(&bar));
         }
     });
     sender
@@ -91,7 +91,7 @@ fn stage_line(bar: &ProgressBar) -> String {
 /// long each stage took. Ends the search when its time is spent.
 pub(super) struct Stages {
     bar: Bar,
-    /// `None` where the search may take longer than a clock counts.
+    /// `None` if the search may take longer than a clock counts.
     deadline: Option<Instant>,
     start: Instant,
     seen: Mutex<Seen>,
@@ -130,7 +130,7 @@ impl Stages {
             .unwrap_or_else(PoisonError::into_inner);
         let (last, begun) = times.now();
         self.bar
-            .suspend(|| voice::took(last.text(), self.start + begun));
+            .suspend(|| terminal::took(last.text(), self.start + begun));
         self.bar.finish_and_clear();
         times.end(self.start.elapsed())
     }
@@ -141,7 +141,7 @@ impl Watch for Stages {
         let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((ended, begun)) = seen.times.note(now.stage, self.start.elapsed()) {
             self.bar
-                .suspend(|| voice::took(ended.text(), self.start + begun));
+                .suspend(|| terminal::took(ended.text(), self.start + begun));
         }
         self.bar.set_position(now.stage.number() as u64);
         self.bar.set_message(seen.message(now));
@@ -154,7 +154,7 @@ impl Watch for Stages {
 }
 
 impl Seen {
-    /// What is being done and, where that is a number of models to fit, about how long it will still take.
+    /// What is being done and, if it is fitting a number of models, about how long it will still take.
     fn message(&mut self, now: Progress<'_>) -> String {
         match now.fits {
             Some(Fits { done, of }) if done > 0 => {
@@ -195,7 +195,7 @@ mod tests {
         let line = step_line(&epochs);
         let share = "34 %: 3400 of 10000 epochs, loss 1.2e-3";
         assert!(line.starts_with(share), "{line}");
-        // An unknown number of steps is no division by zero.
+        // An unknown number of steps does not divide by zero.
         assert!(step_line(&bar(0)).starts_with("0 %: 0 of 0"));
         let stages = stages();
         stages.set_position(3);

@@ -27,7 +27,7 @@ pub(super) fn prediction(model: &Path) -> String {
     )
 }
 
-/// What to do about an error, in terms of the command line, of which the library knows nothing.
+/// What to do about an error, in terms of the command line, which the library knows nothing about.
 pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
     None.or_else(|| of_open_files(error))
         .or_else(|| error.downcast_ref().and_then(of_output))
@@ -43,7 +43,7 @@ pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
         .or_else(|| error.downcast_ref().and_then(of_export))
 }
 
-/// What mends a finding about a log, as it is to be pasted.
+/// What fixes a finding about a log, ready to paste.
 pub(super) fn of_finding(remedy: &Remedy) -> String {
     match remedy {
         Remedy::LeaveOut(spans) => format!("--leave-out {}", spans.join(" ")),
@@ -51,10 +51,10 @@ pub(super) fn of_finding(remedy: &Remedy) -> String {
     }
 }
 
-/// What to do where nothing more fits on a disk.
+/// What to do if a disk is full.
 const FULL: &str = "free some space, or give another folder with --out";
 
-/// Of a process that has as many files open as it may: a merge has one open in each part.
+/// For a process with as many open files as it may have: a merge has one open in each part.
 fn of_open_files(error: &(dyn Error + 'static)) -> Option<&'static str> {
     let is_it = |cause: &(dyn Error + 'static)| {
         let cause: Option<&io::Error> = cause.downcast_ref();
@@ -62,7 +62,7 @@ fn of_open_files(error: &(dyn Error + 'static)) -> Option<&'static str> {
     };
     Chain::new(error)
         .any(is_it)
-        .then_some("allow more with `ulimit -n`, or merge some of the parts at a time")
+        .then_some("raise the limit with `ulimit -n`, or merge a few of the parts at a time")
 }
 
 fn of_output(error: &OutputError) -> Option<&'static str> {
@@ -80,11 +80,11 @@ fn of_folder(error: &RunFolderError) -> Option<&'static str> {
             Some("wait until that has ended, or give another folder with --out")
         }
         RunFolderError::OtherRun { .. } | RunFolderError::Damaged { .. } => {
-            Some("give another folder with --out, or remove this one to start anew")
+            Some("give another folder with --out, or remove this one to start over")
         }
         RunFolderError::Io { source, .. } if source.kind() == ErrorKind::StorageFull => Some(FULL),
         RunFolderError::NotAFolder { .. } | RunFolderError::Io { .. } => {
-            Some("give a folder that can be written with --out")
+            Some("give a writable folder with --out")
         }
         RunFolderError::Output(_) => None,
     }
@@ -153,5 +153,5 @@ fn of_study(error: &StudyError) -> Option<&'static str> {
 }
 
 fn of_export(error: &ExportError) -> Option<&'static str> {
-    matches!(error, ExportError::Delay { .. }).then_some("--step gives it")
+    matches!(error, ExportError::Delay { .. }).then_some("set it with --step")
 }

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 
-use super::{Answer, voice};
+use super::{Answer, terminal};
 use residyn_io::runs::RunFolder;
 use residyn_report::Report;
 
@@ -20,7 +20,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let report = Report::read(&arguments.folder)?;
     let _folder = RunFolder::open(&arguments.folder)?;
     for path in report.write_readable(&arguments.folder)? {
-        voice::print(&format!("{}\n", path.display()))?;
+        terminal::print(&format!("{}\n", path.display()))?;
     }
     Ok(Answer::Yes)
 }

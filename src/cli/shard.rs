@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde_json::json;
 
-use super::{Answer, Common, LIBRARY, voice};
+use super::{Answer, Common, LIBRARY, terminal};
 use residyn_io::files::content_id;
 use residyn_io::runs::{Identity, Part, RunFolder, Shard};
 
@@ -19,7 +19,7 @@ pub(super) struct Sharding {
 }
 
 impl Sharding {
-    /// The part of `run` that is asked for, which `folder` now holds; none where the whole run is.
+    /// The part of `run` that is asked for, which `folder` now holds; none if the whole run is asked for.
     pub fn part(&self, folder: &RunFolder, run: Identity) -> Result<Option<Part>> {
         let begin = |shard| Ok(Part::begin(folder, shard, run, program_id()?)?);
         self.shard.map(begin).transpose()
@@ -33,10 +33,10 @@ pub(super) fn finish(part: Part, common: &Common) -> Result<Answer> {
     let out = folder.path();
     if common.json {
         let value = json!({"schema": 1, "shard": shard.to_string(), "out": out});
-        voice::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
+        terminal::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
     } else {
         let text = format!("shard {shard} is done: {}\n", out.display());
-        voice::answer(out.display(), &text)?;
+        terminal::answer(out.display(), &text)?;
     }
     Ok(Answer::Yes)
 }

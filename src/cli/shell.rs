@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::{Args, CommandFactory};
 use clap_complete::{Shell, generate};
 
-use super::{Answer, Cli, voice};
+use super::{Answer, Cli, terminal};
 use residyn_io::files::OutputError;
 
 /// Completions for a shell, on standard output
@@ -16,11 +16,11 @@ pub(super) struct Completions {
     shell: Shell,
 }
 
-/// Manual pages, one a command
+/// Manual pages, one per command
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  residyn man ~/.local/share/man/man1")]
 pub(super) struct Man {
-    /// Folder to write them into; it is made where there is none
+    /// Folder to write them into; it is created if missing
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }
@@ -28,7 +28,7 @@ pub(super) struct Man {
 pub(super) fn completions(arguments: &Completions) -> Result<Answer> {
     let mut out = Vec::new();
     generate(arguments.shell, &mut Cli::command(), "residyn", &mut out);
-    voice::print(&String::from_utf8_lossy(&out))?;
+    terminal::print(&String::from_utf8_lossy(&out))?;
     Ok(Answer::Yes)
 }
 

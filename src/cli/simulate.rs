@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
-use super::{Answer, Common, inputs, voice};
+use super::{Answer, Common, inputs, terminal};
 use residyn_core::data::Joint;
 use residyn_core::model::Library;
 use residyn_core::plant::Plant;
@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     }
     check_room(&arguments.out)?;
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
-    let log = voice::stage("simulating", || plant.record(&mut rng))?;
+    let log = terminal::stage("simulating", || plant.record(&mut rng))?;
     write_log(&log, &arguments.out).context("the log was not written")?;
     let effects: Vec<&str> = plant
         .effects
@@ -96,9 +96,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         .collect();
     if arguments.common.json {
         let value = json!({"out": arguments.out, "rows": log.rows(), "duration_s": log.duration(), "effects": effects});
-        voice::print(&format!("{value:#}\n"))?;
+        terminal::print(&format!("{value:#}\n"))?;
     } else {
-        voice::print(&format!(
+        terminal::print(&format!(
             "{}: {} rows, {} s\n",
             arguments.out.display(),
             log.rows(),

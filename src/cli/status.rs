@@ -7,12 +7,12 @@ use residyn_core::identify::FitError;
 use residyn_core::plant::PlantError;
 use residyn_train::TrainError;
 
-/// What a command finds beyond the finite numbers.
+/// A result of a command that is not finite.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(super) struct NotFinite(pub String);
 
-/// 1 where the program ran until its numbers ceased to be finite, 2 where it could not run.
+/// 1 if the program ran until its numbers ceased to be finite, 2 if it could not run.
 pub(super) fn status(error: &anyhow::Error) -> u8 {
     match error.chain().any(is_divergence) {
         true => 1,

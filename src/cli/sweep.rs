@@ -12,11 +12,11 @@ use serde_json::json;
 
 use self::store::{Store, Stored};
 use super::shard::{self, Sharding};
-use super::{Answer, Common, command_line, inputs, interrupt, progress, voice};
+use super::{Answer, Common, command_line, inputs, interrupt, progress, terminal};
 use residyn_io::runs::{Identity, RunFolder};
 use residyn_train::recipe::{Job, Member, Recipe, SweepResults};
 
-/// Train many models by one recipe, with different initial weights or different weights of the penalty
+/// Train many models with one recipe, with different initial weights or different weights of the penalty
 ///
 /// All models are trained on the data of --seed, one after the other. Each is a line of DIR/models.jsonl, and an
 /// interrupted sweep is resumed.
@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     /// Weights of the penalty, one per model, from LOW to HIGH in equal ratios
     #[arg(long, value_name = "LOW-HIGH")]
     alpha: Option<Alphas>,
-    /// Give all models the initial weights of --seed, so that they differ in alpha alone
+    /// Give all models the initial weights of --seed, so that they differ only in alpha
     #[arg(long, requires = "alpha")]
     one_seed: bool,
     /// Folder of the results: models.jsonl and sweep.json
@@ -72,7 +72,7 @@ impl FromStr for Alphas {
             ));
         }
         if low > high {
-            return Err(format!("LOW is {low}, above HIGH, {high}; exchange them"));
+            return Err(format!("LOW is {low}, above HIGH, {high}; swap them"));
         }
         Ok(found)
     }
@@ -101,7 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         .begun_by(command_line());
     let folder = RunFolder::open(out)?;
     for note in &job.data.notes {
-        voice::say(format!("note: {note}"));
+        terminal::say(format!("note: {note}"));
     }
     let members = arguments.members();
     job.check_members(&members)?;
@@ -124,7 +124,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let swept = SweepResults::new(&job, &members, trained, wall_s);
     let json = serde_json::to_string_pretty(&swept)? + "\n";
     folder.write_text("sweep.json", &json)?;
-    voice::print(&if common.json { json } else { swept.text() })?;
+    terminal::print(&if common.json { json } else { swept.text() })?;
     let all_diverged = swept.totals.diverged == swept.totals.models;
     Ok(if all_diverged {
         Answer::No
@@ -186,7 +186,7 @@ fn train(job: &Job, members: &[Member], store: &mut Store, arguments: &Arguments
         store.add(member, trained, since.elapsed().as_secs_f64())?;
     }
     bar.finish_and_clear();
-    voice::took("training", begun);
+    terminal::took("training", begun);
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 
 use super::fitting::{Saving, carry_out};
-use super::{Answer, Common, command_line, inputs, voice};
+use super::{Answer, Common, command_line, inputs, terminal};
 use residyn_train::recipe::{Job, Recipe};
 
 /// Train a hybrid, physics-only or data-driven model from scratch, on logs or on a simulated plant
@@ -36,7 +36,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = effects.library()?;
     let recipe = Recipe::read(config)?;
     let prepare = || Job::train(recipe, &library, common.device, common.seed);
-    let job = voice::stage("preparing the data", prepare)?;
+    let job = terminal::stage("preparing the data", prepare)?;
     let dir = saving.folder(config, "checkpoint");
     carry_out(&job.begun_by(command_line()), &dir, saving, common)
 }

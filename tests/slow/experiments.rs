@@ -23,7 +23,7 @@ fn plant(
     path
 }
 
-/// Logs of a plant, one a seed.
+/// Logs of a plant, one per seed.
 fn record(plant: &Path, seeds: std::ops::Range<u32>, duration_s: &str) -> Vec<String> {
     let log = |seed: u32| {
         let seed = seed.to_string();
@@ -73,7 +73,7 @@ fn alternative<'r>(report: &'r Value, effect: &str) -> Option<&'r Value> {
     report["alternatives"].as_array().unwrap().iter().find(has)
 }
 
-/// Small swings at one speed: friction that grows with the speed and drag that grows with its square are the same.
+/// Small swings at one speed: friction proportional to speed and drag proportional to its square look the same.
 #[test]
 fn the_proposed_experiment_tells_what_the_logs_did_not() {
     let folder = tempfile::tempdir().unwrap();
@@ -126,7 +126,7 @@ fn the_proposed_experiment_tells_what_the_logs_did_not() {
     );
 }
 
-/// A drive that gives less and a rotor that takes more: the same acceleration. Only another mass tells.
+/// A drive that delivers less and a rotor that takes more: the same acceleration. Only another mass distinguishes them.
 fn sled(parameters: &str, mass: &str) -> (Value, Value) {
     let folder = tempfile::tempdir().unwrap();
     let model = folder.path().join("sled.model.toml");

@@ -52,7 +52,7 @@ fn linkage() -> ExportModel {
     ExportModel::of_system(&system, Integrator::RK4, 0.005, json!({}))
 }
 
-/// A model's header in a folder of its own.
+/// A model's header in its own folder.
 struct Header {
     name: &'static str,
     model: ExportModel,
@@ -128,7 +128,7 @@ fn rows(mut program: Command, question: &str, what: &str) -> Vec<Vec<f64>> {
     said.lines().map(row).collect()
 }
 
-/// Every model's header, or none where a tool is missing.
+/// Every model's header, or none if a tool is missing.
 fn headers(tools: &[&str]) -> Vec<Header> {
     if !there_are(tools) {
         return Vec::new();

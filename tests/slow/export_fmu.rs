@@ -17,12 +17,12 @@ fn model(name: &str) -> ExportModel {
     models.find(|(known, _)| *known == name).unwrap().1
 }
 
-/// Those of either standard.
+/// The formats of both standards.
 fn formats() -> [&'static Format; 2] {
     ["fmu", "fmu2"].map(|name| find(name).unwrap())
 }
 
-/// All of them in each format.
+/// All items in each format.
 fn each<T: Clone>(all: Vec<T>) -> impl Iterator<Item = (T, &'static Format)> {
     let all = all.into_iter();
     all.flat_map(|one| formats().map(|format| (one.clone(), format)))
@@ -51,7 +51,7 @@ fn a_simulator_predicts_what_the_program_does() {
     }
 }
 
-/// What a solver of its own may differ by is the step's own error, and that of straight lines through a delay.
+/// An independent solver may differ by the step's own error and by the error of straight lines through a delay.
 #[test]
 fn a_simulator_can_tune_save_and_differentiate_a_unit() {
     for ((name, parameter, tuned, solver_tolerance), format) in each(vec![
@@ -93,7 +93,7 @@ fn a_simulator_can_tune_save_and_differentiate_a_unit() {
     }
 }
 
-/// Names and bytes of what is in the unit.
+/// Names and bytes of the unit's files.
 fn unpacked(model: &ExportModel, format: &Format) -> Vec<(String, Vec<u8>)> {
     let files = (format.files)(model, "model.fmu".as_ref()).unwrap();
     let mut archive = ZipArchive::new(Cursor::new(&files[0].bytes)).unwrap();
@@ -144,7 +144,7 @@ fn the_description_names_units_effects_and_intervals() {
         assert_eq!(file, "modelDescription.xml");
         let text = String::from_utf8(text).unwrap();
         let xml = roxmltree::Document::parse(&text).unwrap();
-        // FMI 2.0 says of the value in an element below.
+        // FMI 2.0 gives the value in a nested element.
         let said = |name: &str, attribute: &str| {
             let mut nodes = xml.descendants();
             let named = nodes.find(|node| node.attribute("name") == Some(name));

@@ -43,7 +43,7 @@ fn blocks(page: &str) -> Vec<Block<'_>> {
     blocks
 }
 
-/// Run commands as a reader would, and return what they print; `None` where they need measured logs that are not there.
+/// Run commands as a reader would, and return their output; `None` if they need measured logs that are missing.
 fn run(commands: &str, folder: &Path) -> Result<Option<String>, String> {
     let mut shell = Command::new("bash");
     if commands.contains("$RESIDYN_DATA") {
@@ -70,7 +70,7 @@ fn run(commands: &str, folder: &Path) -> Result<Option<String>, String> {
     }
 }
 
-/// Run a block, or compare it with what the one before it printed.
+/// Run a block, or compare it with the output of the block before it.
 fn try_block(block: &Block, folder: &Path, printed: &mut Option<String>) -> Result<(), String> {
     match (block.language, printed.as_deref()) {
         ("sh", _) => *printed = run(block.text, folder)?,
@@ -95,7 +95,8 @@ fn try_page(page: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// What differs between what a page shows and what was printed: `...` stands for any text, as a line for any lines.
+/// The difference between the output that a page shows and the actual output: `...` stands for any text, alone on a
+/// line for any lines.
 fn compare(shown: &str, printed: &str) -> Result<(), String> {
     let mut printed = printed.lines().filter(|line| !is_progress(line));
     let mut is_gap = false;
@@ -120,7 +121,7 @@ fn compare(shown: &str, printed: &str) -> Result<(), String> {
     }
 }
 
-/// Whether a line is one of those that long work writes every ten seconds.
+/// Whether a line is a progress line, which long work writes every ten seconds.
 fn is_progress(line: &str) -> bool {
     let share = line.split_once(" %: ").map(|(share, _)| share);
     line.starts_with("stage ") || share.is_some_and(|share| share.parse::<u8>().is_ok())
@@ -190,7 +191,7 @@ fn prose(page: &str) -> String {
     page.split("```").step_by(2).collect()
 }
 
-/// What links to a heading, as GitHub makes it.
+/// The anchor of a heading, as GitHub makes it.
 fn anchor(heading: &str) -> String {
     let text = heading.trim_start_matches('#').trim().to_lowercase();
     let kept = text
@@ -199,7 +200,7 @@ fn anchor(heading: &str) -> String {
     kept.collect::<String>().replace(' ', "-")
 }
 
-/// Whether a page has a heading of this anchor.
+/// Whether a page has a heading with this anchor.
 fn has_anchor(page: &Path, wanted: &str) -> bool {
     let text = prose(&fs::read_to_string(page).unwrap());
     let mut headings = text.lines().filter(|line| line.starts_with('#'));

@@ -1,7 +1,7 @@
 //! Large logs, many logs and many effects in one call.
 //!
-//! `RESIDYN_LOAD_MB` is the size of the large log, 100 unless told otherwise; a folder for temporary files of such a size is
-//! named by `TMPDIR`. `benches/load` measures speeds.
+//! `RESIDYN_LOAD_MB` is the size of the large log, 100 by default; `TMPDIR` names a folder for temporary files of that
+//! size. `benches/load` measures speeds.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -12,8 +12,7 @@ use tempfile::TempDir;
 
 use crate::support::{answers, residyn_within, succeeds, text};
 
-/// A row of a pendulum with gravity and friction, driven by two sines from an own time on, in the digits of a logger that
-/// prints doubles.
+/// A row of a pendulum with gravity and friction, driven by two sines, in the digits of a logger that prints doubles.
 fn row(time: f64) -> [f64; 3] {
     let angle = 0.9 * (1.1 * time).sin() + 0.2 * (3.7 * time).sin();
     let speed = 0.99 * (1.1 * time).cos() + 0.74 * (3.7 * time).cos();
@@ -23,7 +22,7 @@ fn row(time: f64) -> [f64; 3] {
     [angle, speed, torque]
 }
 
-/// Writes a log of so many rows that begins at a time of the motion.
+/// Writes a log of `rows` rows that begins at `start_s` of the motion.
 fn write_log(path: &Path, rows: usize, step_s: f64, start_s: f64) {
     let mut out = BufWriter::new(File::create(path).unwrap());
     writeln!(out, "time,q1,qd1,tau1").unwrap();
@@ -36,9 +35,9 @@ fn write_log(path: &Path, rows: usize, step_s: f64, start_s: f64) {
 }
 
 fn megabytes() -> u64 {
-    let told = std::env::var("RESIDYN_LOAD_MB").ok();
-    told.map_or(100, |told| {
-        told.parse().expect("RESIDYN_LOAD_MB is a number")
+    let message = std::env::var("RESIDYN_LOAD_MB").ok();
+    message.map_or(100, |message| {
+        message.parse().expect("RESIDYN_LOAD_MB is a number")
     })
 }
 
@@ -57,7 +56,7 @@ fn a_large_log_is_read_and_audited_in_twice_its_size() {
     assert_eq!(audit[0]["examined_rows"], 262_144);
 }
 
-/// A folder with so many logs of a second, each of another part of the motion.
+/// A folder with `count` logs of a second, each of another part of the motion.
 fn logs(count: usize) -> (TempDir, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let log = |k: usize| {
@@ -87,7 +86,7 @@ fn a_thousand_logs_are_audited_and_predicted_in_one_call() {
     assert!(evaluated["windows"][0].as_u64().unwrap() > 10_000);
 }
 
-/// Writes so many effects of a joint: no two of the same shape.
+/// Writes `count` effects of a joint: no two of the same shape.
 fn write_effects(folder: &Path, count: usize) {
     for k in 0..count {
         let wave = 0.2 + 0.05 * k as f64;

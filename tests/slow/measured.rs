@@ -12,7 +12,7 @@ fn report(arguments: &[&str]) -> Value {
     serde_json::from_str(&answers(&all)).expect("the report is JSON")
 }
 
-/// Position error at 0.5 s, after as a share of before.
+/// Position error at 0.5 s, after the loop is closed relative to before.
 fn ratio(report: &Value, joint: usize) -> f64 {
     let rmse = |model: &str| {
         report["error"][model]["position_rmse"][1][joint]
@@ -87,7 +87,7 @@ fn friction_is_found_in_a_pendulum_that_swings_freely() {
     let report = report(&["--model", "pendulum", "--train", text(&log)]);
     assert!(!names(&report).is_empty());
     assert!(ratio(&report, 0) <= 0.3, "{}", ratio(&report, 0));
-    // Without torque only ratios to the inertia can be known.
+    // Without torque, only ratios to the inertia can be determined.
     assert_eq!(report["identifiability"]["held"][0], "C_i");
     assert_eq!(report["logs"]["split"]["end_of_each_log"]["gap_s"], 0.5);
 }
@@ -126,7 +126,7 @@ fn the_loop_closes_on_a_double_pendulum() {
     );
 }
 
-/// Parameters of the lab's own identification, found on `pd_system_identification.csv`.
+/// Parameters of the lab's own identification from `pd_system_identification.csv`.
 const PUBLISHED: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/docs/rigs/dfki_simple_pendulum_published.toml"
@@ -153,7 +153,7 @@ fn a_log_that_misled_an_identification_is_told_from_a_good_one() {
     for (severity, words) in [
         ("serious", "tau1 chatters: 2.2"),
         ("warning", "disagree with dq1/dt"),
-        ("warning", "s of motion, 6 stretches"),
+        ("warning", "s of motion, 6 intervals"),
         ("warning", "the motion explains 14."),
         ("warning", "trails tau1 by 15."),
     ] {
@@ -187,7 +187,7 @@ fn published_values_fail_on_other_logs_and_the_report_says_which() {
         rmse(&error["before"]) < 0.3 * rmse(&error["declared"]),
         "{error}"
     );
-    // The documented masses (0.676 kg at 0.45 m) say 0.30 kg m and 0.14 kg m^2 without the rotor.
+    // The documented masses (0.676 kg at 0.45 m) give 0.30 kg m and 0.14 kg m^2 without the rotor.
     let contradicted = report["contradicted"].as_array().unwrap();
     for name in ["J", "mc"] {
         let one = contradicted.iter().find(|one| one["name"] == name);
@@ -216,7 +216,7 @@ fn published_models_of_a_double_pendulum_are_scored_as_they_are() {
         ]);
         let error: Value = serde_json::from_str(&json).unwrap();
         assert_eq!(error["diverged"], serde_json::json!([0, 0, 0]));
-        // A wrong sign in gravity or friction costs many times this over half a second.
+        // A wrong sign of gravity or friction costs many times this over half a second.
         for joint in 0..2 {
             let median = error["position_median"][1][joint].as_f64().unwrap();
             assert!(

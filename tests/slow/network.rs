@@ -6,8 +6,8 @@ use serde_json::Value;
 
 use crate::support::{evaluated, succeeds, text};
 
-/// Friction on one side of the turn that depends on the angle: no effect of the library, and a network that is trained on
-/// slow motion continues it at random where the pendulum swings higher and faster.
+/// Angle-dependent friction on one side of the turn: no effect of the library matches it, and a network trained on slow
+/// motion extrapolates it arbitrarily where the pendulum swings higher and faster.
 const ROUGH: &str = r#"
 [effect]
 name = "rough_side"
@@ -17,7 +17,7 @@ force = "-size * sign(qd) * (1 + sin(3*q)) * where(q > 0, 1.0, 0.0)"
 size = { unit = "N m", typical = 0.3 }
 "#;
 
-/// Record the pendulum, driven by so much torque (root mean square, N m).
+/// Record the pendulum, driven by this torque (root mean square, N m).
 fn record(folder: &Path, name: &str, torque: f64, seed: usize) -> String {
     let plant = folder.join(format!("{name}.toml"));
     let rig = format!(
@@ -56,7 +56,7 @@ fn it_helps_on_motion_like_its_own_and_does_no_harm_on_other_motion() {
     let json = succeeds(&[&["closeloop", "--json", "--out", text(&out)], &given[..]].concat());
     let report: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(report["network"]["used"], true, "{}", report["network"]);
-    // As the program reads the two models that it wrote.
+    // The errors are those of the two written models.
     let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
     let after = |log: &str| evaluated(&["--model", text(&model)], log);
     let hybrid = |log: &str| evaluated(&["--checkpoint", text(&checkpoint)], log);

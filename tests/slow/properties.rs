@@ -13,14 +13,13 @@ mod models;
 mod printers;
 mod reports;
 
-/// How many times as many cases as usual are tried: `RESIDYN_PROPERTIES`, 1 without it. A larger number begins with the same
-/// cases.
+/// Factor on the usual number of cases: `RESIDYN_PROPERTIES`, 1 by default. A larger number begins with the same cases.
 fn times() -> u32 {
     let times = env::var("RESIDYN_PROPERTIES");
     times.map_or(1, |times| times.parse().expect("a whole number"))
 }
 
-/// So many cases, the same in every run.
+/// A number of cases, the same ones in every run.
 fn cases(usual: u32) -> ProptestConfig {
     ProptestConfig {
         cases: usual * times(),
@@ -31,7 +30,7 @@ fn cases(usual: u32) -> ProptestConfig {
     }
 }
 
-/// Numbers that are equal to the last bit, or both none.
+/// Numbers that are equal to the last bit, or both NaN.
 fn same_number(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan()
 }

@@ -10,7 +10,7 @@ use residyn_io::read_rig_log;
 use crate::support::log_files::recordings;
 use crate::support::measured;
 
-/// The messages name them in the other order.
+/// The messages name the joints in the other order.
 fn rig() -> Columns {
     Columns {
         joint_names: vec!["elbow".into(), "wrist".into()],
@@ -22,7 +22,7 @@ fn read(path: &Path, columns: &Columns) -> Result<Log, String> {
     read_rig_log(path, 2, columns).map_err(|error| error.to_string())
 }
 
-/// What is said of a recording that is refused.
+/// The error message for a recording that is refused.
 fn refused(name: &str, columns: &Columns) -> Option<String> {
     Some(read(&recordings()?.join(name), columns).unwrap_err())
 }
@@ -119,7 +119,7 @@ fn the_model_file_says_which_of_several_topics_it_is() {
     assert_eq!(log.rows(), 30);
 }
 
-/// Torques on a topic of their own: at other times, numbered, and only from the third row on.
+/// Torques on another topic: at other times, numbered, and only from the third row on.
 #[test]
 fn torques_of_another_topic_are_held_at_the_times_of_the_joints() {
     let Some(folder) = recordings() else { return };
@@ -242,7 +242,7 @@ fn folders_without_a_recording_say_what_is_missing() {
     );
 }
 
-/// Cut anywhere, and each with a bit flipped: read, or refused.
+/// Cut anywhere, and each with a bit flipped: read or refused.
 #[test]
 fn damaged_recordings_are_no_panic() {
     let Some(folder) = recordings() else { return };

@@ -11,7 +11,7 @@ struct Rig {
     rate_hz: f64,
     /// Standard deviation and step of the encoder, rad.
     sensor: [f64; 2],
-    /// b in N m s/rad, `F_c` in N m, c in N m s^2/rad^2: each takes away more than a tenth of the loss.
+    /// b in N m s/rad, `F_c` in N m, c in N m s^2/rad^2: each lowers the loss by more than a tenth.
     friction: [f64; 3],
 }
 

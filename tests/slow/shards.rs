@@ -10,7 +10,7 @@ use crate::support::paths::config;
 use crate::support::run_folders::{ended_alike, files, read};
 use crate::support::{measured, text};
 
-/// Do `command` in shards, one after the other, put them together in `merged`, and do what is left.
+/// Run `command` in shards, one after the other, merge them in `merged`, and do the remaining work.
 fn in_shards(dir: &Path, command: &[&str], of: usize) {
     let shards: Vec<String> = (1..=of).map(|k| format!("{k}/{of}")).collect();
     let parts: Vec<String> = (1..=of).map(|k| format!("part-{k}")).collect();
@@ -23,8 +23,8 @@ fn in_shards(dir: &Path, command: &[&str], of: usize) {
 
 fn merge(dir: &Path, parts: &[String]) {
     let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
-    let told = json(dir, &[&["merge", "--out", "merged"], &parts[..]].concat());
-    assert_eq!(told["missing"], serde_json::json!([]));
+    let message = json(dir, &[&["merge", "--out", "merged"], &parts[..]].concat());
+    assert_eq!(message["missing"], serde_json::json!([]));
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn measured_rigs_in_shards_have_the_results_of_one_machine() {
     json(dir, &[&command[..], &["--out", "whole"]].concat());
     let [merged, whole] = ["merged", "whole"].map(|out| {
         let mut found = files(&dir.join(out));
-        // It says when it was made.
+        // It states when it was made.
         found.remove("report.html").unwrap();
         let timeless = found
             .into_iter()
@@ -68,7 +68,7 @@ fn measured_rigs_in_shards_have_the_results_of_one_machine() {
     assert_eq!(merged.len(), 12, "{:?}", merged.keys());
 }
 
-/// A file without the lines that say how long something took.
+/// A file without the lines that give durations.
 fn timeless(bytes: &[u8]) -> String {
     let lines = str::from_utf8(bytes).unwrap().lines();
     let others = lines.filter(|line| !line.contains("\"seconds\""));
@@ -90,13 +90,13 @@ fn a_sweep_in_shards_has_the_models_of_one_machine() {
     ];
     let swept = |out: &str| read(&dir.join(out).join("sweep.json"), &clock);
     assert_eq!(swept("merged"), swept("whole"));
-    // Another seed is another sweep.
+    // A sweep with another seed is another sweep.
     let other = ["--seed", "4", "--shard", "3/3", "--out", "other"];
     json(dir, &[&command[..], &other].concat());
-    let told = refused(dir, &["merge", "part-1", "other", "--out", "mixed"]);
+    let message = refused(dir, &["merge", "part-1", "other", "--out", "mixed"]);
     assert!(
-        told.contains("its `seed` is 4, here it is 0; leave it out"),
-        "{told}"
+        message.contains("its `seed` is 4, here it is 0; leave it out"),
+        "{message}"
     );
     assert!(!dir.join("mixed").exists());
     let none = refused(
@@ -105,18 +105,24 @@ fn a_sweep_in_shards_has_the_models_of_one_machine() {
     );
     assert!(none.contains("K is 4 and N is 3"), "{none}");
     let lacking = run(dir, &["merge", "part-1", "part-3", "--out", "lacking"]);
-    let told = String::from_utf8(lacking.stderr).unwrap();
-    assert_eq!(lacking.status.code(), Some(1), "{told}");
-    assert!(told.contains("shard 2/3 is not among the parts"), "{told}");
+    let message = String::from_utf8(lacking.stderr).unwrap();
+    assert_eq!(lacking.status.code(), Some(1), "{message}");
+    assert!(
+        message.contains("shard 2/3 is not among the parts"),
+        "{message}"
+    );
     #[cfg(unix)]
     {
         let few_files = "ulimit -n 5; exec \"$0\" merge part-* --out few";
         let mut shell = std::process::Command::new("bash");
         let shell = shell.args(["-c", few_files, env!("CARGO_BIN_EXE_residyn")]);
-        let told = shell.current_dir(dir).output().unwrap();
-        assert_eq!(told.status.code(), Some(2));
-        let told = String::from_utf8(told.stderr).unwrap();
-        assert!(told.contains("allow more with `ulimit -n`"), "{told}");
+        let message = shell.current_dir(dir).output().unwrap();
+        assert_eq!(message.status.code(), Some(2));
+        let message = String::from_utf8(message.stderr).unwrap();
+        assert!(
+            message.contains("raise the limit with `ulimit -n`"),
+            "{message}"
+        );
     }
 }
 
@@ -132,15 +138,18 @@ fn killed_shards_of_an_experiment_end_with_the_bytes_of_one_machine() {
         command.args(["--shard", &shard, "--out", &part]);
         command
     };
-    // The first two are the hybrid and the network alone of the first seed.
+    // The first two runs are the hybrid and the network alone with the first seed.
     for (k, done) in [(1, "hybrid-00"), (2, "data_driven-00")] {
         let rounds = dir.join(format!("part-{k}/runs/{done}/rounds.jsonl"));
         kill_after(&mut shard(k), &rounds, Duration::ZERO);
     }
     let cut = run(dir, &["merge", "part-1", "part-2", "--out", "merged"]);
-    let told = String::from_utf8(cut.stderr).unwrap();
-    assert_eq!(cut.status.code(), Some(1), "{told}");
-    assert!(told.contains("part-1: shard 1/8 is not finished"), "{told}");
+    let message = String::from_utf8(cut.stderr).unwrap();
+    assert_eq!(cut.status.code(), Some(1), "{message}");
+    assert!(
+        message.contains("part-1: shard 1/8 is not finished"),
+        "{message}"
+    );
     fs::remove_dir_all(dir.join("merged")).unwrap();
     for k in 1..=8 {
         assert!(shard(k).output().unwrap().status.success());
@@ -156,7 +165,7 @@ fn killed_shards_of_an_experiment_end_with_the_bytes_of_one_machine() {
     ended_alike(&dir.join("merged"), &dir.join("whole"));
 }
 
-/// What is evaluated after the learning is work of the shards, too.
+/// Evaluation after learning is work for the shards, too.
 #[test]
 fn receding_horizons_in_shards_are_those_of_one_machine() {
     let dir = tempfile::tempdir().unwrap();
@@ -166,7 +175,7 @@ fn receding_horizons_in_shards_are_those_of_one_machine() {
     in_shards(dir, &command, 3);
     let scores = files(&dir.join("merged/runs"));
     let scores = scores.keys().filter(|name| name.contains("/score-"));
-    // Two horizons of two that learn and two that do not, with two seeds.
+    // Two horizons for two methods that learn and two that do not, with two seeds.
     assert_eq!(scores.count(), 16);
     json(dir, &[&command[..], &["--out", "whole"]].concat());
     ended_alike(&dir.join("merged"), &dir.join("whole"));

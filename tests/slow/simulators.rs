@@ -30,7 +30,7 @@ fn of_text(text: &str, integrator: Integrator) -> ExportModel {
     ExportModel::of_system(&system, integrator, 0.01, json!({}))
 }
 
-/// Five bodies, each on the one before.
+/// Five bodies, each attached to the one before.
 fn chain() -> ExportModel {
     let description = fs::read_to_string(fixture("linkage_4r.urdf")).unwrap();
     let mimics = |line: &&str| line.contains("<mimic");
@@ -88,7 +88,7 @@ fn plain() -> Vec<(&'static str, ExportModel)> {
     ]
 }
 
-/// Equations alone, whose mechanism has to be recovered.
+/// Equations only, from which the mechanism has to be recovered.
 fn stated() -> Vec<(&'static str, ExportModel)> {
     let stated = |slides: &str, mass: &[&[&str]], bias: &[&str]| {
         let text = format!(
@@ -125,7 +125,7 @@ fn stated() -> Vec<(&'static str, ExportModel)> {
     ]
 }
 
-/// Models that MJCF alone carries, compared step by step.
+/// Models that only MJCF carries, compared step by step.
 fn driven() -> Vec<(&'static str, ExportModel)> {
     let spring = |joint| effect("joint_spring", joint, "k = 1.5\nq_0 = 0.2");
     let rotor = |joint| effect("rotor_inertia", joint, "J = 0.2");
@@ -212,7 +212,7 @@ fn written_mechanisms_read_back_with_the_same_accelerations() {
                 names.zip(&model.system.joint_names).all(|(a, b)| a == b),
                 "{name}"
             );
-            // URDF says nothing of gravity.
+            // URDF does not state gravity.
             let down = chain.gravity.normalize();
             let own = model.declared().parameters;
             let own = own.iter().find(|p| p.unit == "m/s^2");

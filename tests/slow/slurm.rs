@@ -19,7 +19,7 @@ const SHARDS: usize = 8;
 /// Tasks that the node runs at a time.
 const AT_A_TIME: usize = 4;
 
-/// A cluster of one node, this machine, with all its files in a folder of its own.
+/// A cluster of one node, this machine, with all its files in one folder.
 struct Slurm {
     folder: tempfile::TempDir,
     munged: Child,
@@ -51,7 +51,7 @@ fn is_installed() -> bool {
     false
 }
 
-/// What a command prints that must succeed.
+/// The output of a command that must succeed.
 fn printed(command: &mut Command) -> String {
     let Output {
         status,
@@ -63,7 +63,7 @@ fn printed(command: &mut Command) -> String {
     String::from_utf8(stdout).unwrap().trim().to_owned()
 }
 
-/// Wait until something is so, for at most five minutes.
+/// Wait for a condition, for at most five minutes.
 #[track_caller]
 fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     let begun = Instant::now();
@@ -81,12 +81,12 @@ fn signal(name: &str, pids: &[u32]) {
     printed(Command::new("kill").arg(format!("-{name}")).args(pids));
 }
 
-/// The configuration of a cluster with its files in the folder `at`. A task that was requeued waits for as long as a
-/// credential lasts.
+/// The configuration of a cluster with its files in the folder `at`. A requeued task waits for as long as a credential
+/// lasts.
 fn configuration(at: &str) -> String {
     let host = printed(Command::new("uname").arg("-n"));
     let user = printed(Command::new("id").arg("-un"));
-    // Both are held until both are known, so that they differ.
+    // Both sockets stay open until both ports are known, so that the ports differ.
     let ports = [(); 2].map(|()| TcpListener::bind("127.0.0.1:0").unwrap());
     let [controller, node] = ports.map(|port| port.local_addr().unwrap().port());
     format!(
@@ -110,7 +110,7 @@ fn configuration(at: &str) -> String {
     )
 }
 
-/// The daemon that signs what the others say, on a key that nobody else has.
+/// The daemon that signs the others' messages, with a key that nobody else has.
 fn munged(at: &Path) -> Command {
     let key: Vec<u8> = (0..128).map(|_| rand::random()).collect();
     fs::write(at.join("munge.key"), key).unwrap();
@@ -137,14 +137,14 @@ fn slurmd(at: &Path) -> Command {
     slurmd
 }
 
-/// Start a daemon that writes to the log of all.
+/// Start a daemon that writes to the common log.
 fn begin(at: &Path, mut daemon: Command) -> Child {
     let path = at.join("daemons.log");
     let log = || {
         let opened = File::options().create(true).append(true).open(&path);
         opened.unwrap()
     };
-    // Daemons are not in the path of all users.
+    // Daemons are not on every user's path.
     let programs = format!("{}:/usr/sbin", std::env::var("PATH").unwrap());
     let daemon = daemon.env("PATH", programs).stdout(log()).stderr(log());
     daemon.spawn().unwrap()
@@ -187,13 +187,13 @@ impl Slurm {
         output.stdout == b"idle\n"
     }
 
-    /// The names of jobs, of array jobs those of the tasks, that are in one of these states.
+    /// The names of jobs in one of these states; for array jobs, the names of their tasks.
     fn jobs(&self, states: &str) -> Vec<String> {
         let listed = printed(&mut self.client("squeue", &["-h", "-r", "-o", "%i", "-t", states]));
         listed.lines().map(str::to_owned).collect()
     }
 
-    /// Wait until the controller has written to disk all that it knows now.
+    /// Wait until the controller has written its current state to disk.
     fn save(&self, job: &str, mark: &str) {
         let comment = format!("Comment={mark}");
         printed(&mut self.client("scontrol", &["update", &format!("JobId={job}"), &comment]));
@@ -237,7 +237,7 @@ impl Drop for Slurm {
     }
 }
 
-/// The tasks that work: number of the shard and process.
+/// The running tasks: number of the shard and process.
 fn working(parts: &Path) -> Vec<(usize, u32)> {
     let task = |k: usize| {
         let pid = fs::read_to_string(parts.join(format!(".{k}.lock"))).ok()?;
@@ -297,8 +297,8 @@ fn an_array_job_whose_tasks_and_daemons_are_killed_ends_with_the_bytes_of_one_ma
     };
     printed(&mut slurm.client("scontrol", &["requeue", &task(requeued)]));
 
-    // Both daemons are killed, and a task ends before they are back. The tasks stand still until the controller has written
-    // to disk all that it knows: what it knows besides is lost with it.
+    // Both daemons are killed, and a task ends before they are back. The tasks are stopped until the controller has
+    // written its state to disk: unsaved state is lost when it is killed.
     until("the node is full again", || {
         let others = |&(k, _): &(usize, u32)| ![killed, requeued].contains(&k);
         is_full() && working(&parts).iter().all(others)

@@ -17,7 +17,7 @@ pub fn described(chain: &Chain) -> Model {
     Model::from_text(path, &model_text(chain), library.effects()).unwrap()
 }
 
-/// Its bodies alone, without what acts on the joints.
+/// Its bodies only, without the effects on the joints.
 pub fn model(chain: &Chain) -> Model {
     described(chain).with_effects(Vec::new())
 }
@@ -48,7 +48,7 @@ pub fn moved(model: &Model, seconds: f64, seed: u64) -> Log {
         let qd = sum(&|[a, w, p]| a * w * (w * t + p).cos());
         let qdd = sum(&|[a, w, p]| -a * w * w * (w * t + p).sin());
         let mut tau = vec![0.0; n];
-        // What depends on the torque makes the difference one to first order.
+        // Effects that depend on the torque make the difference exact only to first order.
         for _ in 0..3 {
             let inputs = [&q, &qd, &tau, &vec![t][..], &qdd, &values].concat();
             let off = balance.program.eval(&inputs);

@@ -26,7 +26,7 @@ fn record(folder: &Path) {
     }
 }
 
-/// The rig's true values, without its friction, as the published set.
+/// The rig's true values, without its friction, as the published parameter set.
 pub const RIGS: &str = r#"
 plain = ["coulomb_friction"]
 
@@ -59,7 +59,7 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    /// Run the command with these flags too.
+    /// Run the command with these additional flags.
     pub fn command(&self, more: &[&str], run: impl Fn(&[&str])) {
         let [rigs, out] = ["rigs.toml", "out"].map(|name| self.path(name));
         let data = text(self.folder.path());

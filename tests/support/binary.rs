@@ -13,7 +13,7 @@ pub fn residyn(arguments: &[&str]) -> Output {
         .expect("the binary runs")
 }
 
-/// Run the program in so many kB of virtual memory.
+/// Run the program in this many kB of virtual memory.
 #[cfg(unix)]
 pub fn residyn_within(memory_kb: u64, arguments: &[&str]) -> Output {
     // The threads' own shares of virtual memory depend on the machine.
@@ -54,7 +54,7 @@ pub fn refuses(arguments: &[&str]) -> String {
     errors
 }
 
-/// Each part must stand in the message.
+/// The message must contain each part.
 #[track_caller]
 pub fn says(message: &str, parts: &[&str]) {
     for part in parts {
@@ -62,14 +62,15 @@ pub fn says(message: &str, parts: &[&str]) {
     }
 }
 
-/// The error 0.5 s ahead of the first joint on a log, as `residyn evaluate` gives it for `--model FILE` or `--checkpoint DIR`.
+/// The error 0.5 s ahead of the first joint on a log, as `residyn evaluate` gives it for `--model FILE` or
+/// `--checkpoint DIR`.
 pub fn evaluated(model: &[&str], log: &str) -> f64 {
     let all = [&["evaluate", "--json", "--test", log], model].concat();
     let value: serde_json::Value = serde_json::from_str(&succeeds(&all)).unwrap();
     value["position_rmse"][1][0].as_f64().unwrap()
 }
 
-/// Wait until a run, which must not end before, has made a file.
+/// Wait until a run, which must not end earlier, has made a file.
 pub fn until_there(path: &Path, run: &mut Child) {
     while !path.exists() {
         assert!(run.try_wait().unwrap().is_none(), "the run has ended");
@@ -82,7 +83,7 @@ pub fn text(path: &Path) -> &str {
     path.to_str().expect("scratch paths are UTF-8")
 }
 
-/// What the program says that ran and has no answer.
+/// The output of a program that ran without reaching an answer.
 pub fn ends_without(arguments: &[&str]) -> String {
     let output = residyn(arguments);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();

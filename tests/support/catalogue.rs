@@ -33,7 +33,7 @@ pub fn fitted(effect: &Effect, joint: usize, values: &[f64]) -> FittedEffect {
     }
 }
 
-/// The same form of the sign on every joint.
+/// Uses the same form of the sign on every joint.
 pub fn dynamics(system: &Model, effects: &[FittedEffect], sign: SignForm) -> Dynamics {
     let width = match sign {
         SignForm::Exact => 0.0,
@@ -41,7 +41,7 @@ pub fn dynamics(system: &Model, effects: &[FittedEffect], sign: SignForm) -> Dyn
     };
     let model = system.with_effects(effects.to_vec());
     model
-        .with_sign_widths(vec![width; system.joints])
+        .with_smoothing_velocities(vec![width; system.joints])
         .dynamics()
 }
 
@@ -56,7 +56,7 @@ pub fn can_act(system: &Model, effect: &Effect, joint: usize) -> bool {
         || matches!(effect.entry, Entry::Payload(_)))
 }
 
-/// An effect as a user would write one, in a folder of the user's own.
+/// An effect as a user would write it in a folder of effects.
 pub const USER_EFFECT: &str = r#"
 [effect]
 name = "eddy_brake"
@@ -81,7 +81,7 @@ pub struct Case {
     pub dynamics: Dynamics,
 }
 
-/// Every system alone and with every effect (and every probe shape) on every joint that it can act on.
+/// Every system alone and with every effect (and every probe shape) on every joint on which the effect can act.
 pub fn catalog(sign: SignForm) -> Vec<Case> {
     let library = library_with_user_effect();
     let mut cases = Vec::new();
@@ -130,7 +130,7 @@ pub fn points(dynamics: &Dynamics, count: usize, seed: u64) -> Vec<Vec<f64>> {
     (0..count).map(|_| point(dynamics, &mut rng)).collect()
 }
 
-/// The derivatives of the accelerations by every input, `[joint * inputs + input]`.
+/// The derivatives of the accelerations with respect to every input, `[joint * inputs + input]`.
 pub fn jacobian(dynamics: &Dynamics) -> Program {
     let mut graph = Graph::new();
     let names = dynamics.program.inputs();
@@ -164,7 +164,7 @@ pub fn column(points: &[Vec<f64>], k: usize) -> Vec<f64> {
     points.iter().map(|point| point[k]).collect()
 }
 
-/// Fails unless `found` is within `share` of `wanted`, or of 1 where that is smaller.
+/// Fails unless `found` is within `share` of `wanted`, or of 1 if that is smaller.
 #[track_caller]
 pub fn assert_near(found: f64, wanted: f64, share: f64, what: &str) {
     let off = (found - wanted).abs() / wanted.abs().max(1.0);

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use super::paths::ours;
 
-/// What `tests/run --quick` runs needs no other programs.
+/// Tests of `tests/run --quick` need no other programs.
 pub fn not_in_a_quick_run() {
     assert!(
         std::env::var_os("RESIDYN_QUICK").is_none(),
@@ -32,7 +32,7 @@ pub fn client(script: &str, arguments: &[&Path]) {
     assert!(run.status.success(), "{script} failed:\n{said}");
 }
 
-/// Whether there is a browser; without one, say so loudly. CI must have it.
+/// Whether a browser is installed; if not, say so loudly. CI must have one.
 fn has_browser() -> bool {
     let is_there =
         ["chromium", "chromedriver"].map(|name| Path::new("/usr/bin").join(name).exists());
@@ -49,7 +49,7 @@ fn has_browser() -> bool {
     false
 }
 
-/// Look at a page in a browser, where there is one.
+/// Look at a page in a browser, if there is one.
 pub fn look_at(page: &Path) {
     not_in_a_quick_run();
     if has_browser() {

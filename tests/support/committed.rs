@@ -4,11 +4,11 @@ use std::env;
 use std::fs;
 use std::path::Path;
 
-/// How far a number may be off, as a share of it. Answers in double precision are the same to the last digit with AVX-512 and with
-/// AVX2 alone; processors that do not fuse a product and a sum, and other libraries of mathematics, round otherwise.
+/// Relative tolerance of a number. Answers in double precision are the same to the last digit with AVX-512 and with
+/// AVX2 alone; processors that do not fuse a product and a sum, and other mathematics libraries, round differently.
 const TOLERANCE: f64 = 1e-6;
 
-/// Compare a text with a committed file, line by line, or write it there where `RESIDYN_BLESS` asks for it.
+/// Compare a text with a committed file, line by line, or write it there if `RESIDYN_BLESS` asks for it.
 pub fn is_as_committed(path: &Path, found: &str, same: fn(&str, &str) -> bool) {
     let wanted = fs::read_to_string(path).unwrap_or_default();
     let Some(difference) = difference(&wanted, found, same) else {
@@ -41,7 +41,7 @@ pub fn difference(wanted: &str, found: &str, same: fn(&str, &str) -> bool) -> Op
     unreachable!()
 }
 
-/// Whether two lines have the same words, and numbers that are no further apart than rounding puts them.
+/// Whether two lines have the same words, and numbers that differ by no more than rounding.
 pub fn same_but_for_rounding(wanted: &str, found: &str) -> bool {
     let (wanted, found) = (pieces(wanted), pieces(found));
     let alike = |(a, b): (&&str, &&str)| match (a.parse::<f64>(), b.parse::<f64>()) {
@@ -51,7 +51,7 @@ pub fn same_but_for_rounding(wanted: &str, found: &str) -> bool {
     wanted.len() == found.len() && wanted.iter().zip(&found).all(alike)
 }
 
-/// A line cut into numbers and what stands between them. The digits of a name, as in `tau1`, are part of it.
+/// A line cut into numbers and the text between them. Digits of a name, as in `tau1`, are part of the name.
 fn pieces(line: &str) -> Vec<&str> {
     let in_word = |c: char| c.is_alphanumeric() || ['_', '.', '+', '-'].contains(&c);
     let mut pieces = Vec::new();

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use rand_chacha::ChaCha8Rng;
+use residyn::exported_task;
 use residyn_core::model::{
     Angles, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model, ModelWeights,
     ResidualOn,
@@ -60,7 +61,7 @@ joint = 2
 m = 4.0
 "#;
 
-/// All of them, by name.
+/// All models, by name.
 pub fn all() -> Vec<(&'static str, ExportModel)> {
     let fine = Integrator::fine(4.try_into().unwrap());
     let (euler, rk4) = (Integrator::SEMI_IMPLICIT_EULER, Integrator::RK4);
@@ -128,6 +129,7 @@ pub fn system(name: &str, effects: &str) -> Model {
 
 fn physics(system: &Model, integrator: Integrator, step_s: f64) -> ExportModel {
     ExportModel::of_system(system, integrator, step_s, origin(system))
+        .with_task(exported_task(&system.name))
 }
 
 fn hybrid(
@@ -153,6 +155,7 @@ fn data_driven(
         residual: None,
     };
     ExportModel::new(system, numbers, integrator, step_s, origin(system))
+        .with_task(exported_task(&system.name))
 }
 
 fn origin(system: &Model) -> serde_json::Value {
@@ -182,7 +185,7 @@ fn network(joints: usize, settings: &MlpSettings, random: &mut ChaCha8Rng) -> Ml
     network
 }
 
-/// A model that the program exported as JSON, with its weights beside it.
+/// A model that the program exported as JSON, with its weights in a file next to it.
 pub fn exported() -> &'static Path {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {

@@ -34,7 +34,7 @@ pub fn refused(dir: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stderr).unwrap()
 }
 
-/// Start the command, and kill it so long after a file is there.
+/// Start the command, and kill it this long after a file appears.
 pub fn kill_after(command: &mut Command, file: &Path, later: Duration) {
     let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = quiet.spawn().unwrap();

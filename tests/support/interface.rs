@@ -14,14 +14,14 @@ use syn::{
 /// Names of the modules from the crate's root, and of the item itself.
 type Names = Vec<String>;
 
-/// What a file declares.
+/// The declarations of a file.
 #[derive(Default)]
 struct Module {
     public_modules: Vec<String>,
     modules: BTreeSet<String>,
     /// Public items by their names, each with its fields or variants on lines of their own.
     items: BTreeMap<String, Vec<String>>,
-    /// Names that stand for something elsewhere: the name, the path, whether others may use it.
+    /// Aliases of items declared elsewhere: the name, the path, whether it is public.
     uses: Vec<(String, Names, bool)>,
     /// Types of `impl` blocks, and what each block adds to the interface.
     blocks: Vec<(Names, Vec<String>)>,
@@ -31,7 +31,7 @@ struct Module {
 #[derive(Default)]
 struct Crate(BTreeMap<Names, Module>);
 
-/// Every public item of the crate with this root, by the shortest path to it, with what belongs to it below.
+/// Every public item of the crate with this root, by its shortest path, with its parts below it.
 pub fn interface(root: &Path) -> String {
     let mut sources = Crate::default();
     sources.read(root, Vec::new());
@@ -58,12 +58,12 @@ pub fn interface(root: &Path) -> String {
     text.collect()
 }
 
-/// What users reach.
+/// The items that users can reach.
 #[derive(Default)]
 struct Public {
-    /// Items by where they are declared, with the paths under which users find them.
+    /// Items by place of declaration, with the paths under which users find them.
     items: BTreeMap<Names, BTreeSet<Names>>,
-    /// Paths to what other crates declare.
+    /// Paths to items of other crates.
     of_others: BTreeMap<String, String>,
 }
 
@@ -77,9 +77,10 @@ fn shortest(paths: &BTreeSet<Names>) -> &Names {
 }
 
 impl Crate {
-    /// Read a module's file and those of the modules in it.
+    /// Read a module's file and those of its submodules.
     fn read(&mut self, file: &Path, at: Names) {
-        let text = fs::read_to_string(file).unwrap();
+        let text = fs::read_to_string(file);
+        let text = text.unwrap_or_else(|why| panic!("{}: {why}", file.display()));
         let module = Module::of(syn::parse_file(&text).unwrap().items);
         let folder = match file.file_stem().unwrap().to_str().unwrap() {
             "lib" | "mod" => file.parent().unwrap().to_owned(),
@@ -97,7 +98,7 @@ impl Crate {
         self.0.insert(at, module);
     }
 
-    /// Add what users find in a public module and those in it.
+    /// Add the items that users find in a public module and its submodules.
     fn find_public(&self, at: &Names, found: &mut Public) {
         let module = &self.0[at];
         for name in module.items.keys() {
@@ -117,7 +118,7 @@ impl Crate {
         }
     }
 
-    /// What the `impl` blocks of all modules add to an item, sorted.
+    /// The additions of all modules' `impl` blocks to an item, sorted.
     fn added_to(&self, item: &Names) -> BTreeSet<String> {
         let blocks = self.0.iter().flat_map(|(at, module)| {
             let blocks = module.blocks.iter();
@@ -126,7 +127,7 @@ impl Crate {
         blocks.flat_map(|(_, added)| added.clone()).collect()
     }
 
-    /// Where the public item is declared that a path means in a module.
+    /// The place of declaration of the public item that a path means in a module.
     fn resolved(&self, at: &Names, path: &[String]) -> Option<Names> {
         let module = self.0.get(at)?;
         let (first, rest) = path.split_first()?;
@@ -312,7 +313,7 @@ fn of_trait(mut item: ItemTrait) -> Vec<String> {
     lines
 }
 
-/// What `name! { Type { field: Kind = value, .. } }` declares: a struct of that name.
+/// The declaration by `name! { Type { field: Kind = value, .. } }`: a struct of that name.
 fn declared_by(call: &ItemMacro) -> Option<(String, Vec<String>)> {
     let is_name = |token: &TokenTree| matches!(token, TokenTree::Ident(_));
     let mut tokens = call.mac.tokens.clone().into_iter();
@@ -329,7 +330,7 @@ fn declared_by(call: &ItemMacro) -> Option<(String, Vec<String>)> {
     let mut tokens = fields.stream().into_iter();
     while let Some(token) = tokens.next() {
         match token.to_string().as_str() {
-            // An attribute, whose brackets come next.
+            // An attribute; its brackets come next.
             "#" => drop(tokens.next()),
             "," => lines.push(said(&std::mem::take(&mut field))),
             _ => field.extend([token]),
@@ -354,12 +355,12 @@ fn tells(attribute: &Attribute) -> bool {
         .any(|name| attribute.path().is_ident(name))
 }
 
-/// What stands before an empty body.
+/// The code before an empty body.
 fn without_body(code: &impl ToTokens) -> String {
     said(code).trim_end_matches("{ }").trim_end().to_owned()
 }
 
-/// Code on one line, spaced about as rustfmt does.
+/// Code on one line, spaced roughly as rustfmt does.
 fn said(code: &impl ToTokens) -> String {
     let mut line = code.to_token_stream().to_string();
     for (from, to) in [

@@ -30,7 +30,7 @@ pub fn trajectory() -> String {
     format!("time,q1,q2,qd1,qd2,tau1,tau2\n{rows}")
 }
 
-/// A folder with `run.csv` and the same in every format, made once; `None` without the clients that write them.
+/// A folder with `run.csv` and the same in every format, made once; `None` if the clients that write them are missing.
 pub fn formats() -> Option<&'static Path> {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -44,7 +44,7 @@ pub fn formats() -> Option<&'static Path> {
     is_written.then(|| folder.path())
 }
 
-/// A folder with `run.csv` and recordings of it, made once; `None` without the clients that write them.
+/// A folder with `run.csv` and recordings of it, made once; `None` if the clients that write them are missing.
 pub fn recordings() -> Option<&'static Path> {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use super::paths::ours;
 
-/// The folder of measured logs, `$RESIDYN_DATA` or beside the project; `None`, said loudly, where there is none.
+/// The folder of measured logs, `$RESIDYN_DATA` or next to the project; `None`, said loudly, if there is none.
 ///
 /// # Panics
-/// Where `RESIDYN_REQUIRE_DATA` is set and there is none.
+/// If `RESIDYN_REQUIRE_DATA` is set and there is none.
 pub fn measured(set: &str) -> Option<PathBuf> {
     let root =
         std::env::var_os("RESIDYN_DATA").map_or_else(|| ours("../shared/data"), PathBuf::from);

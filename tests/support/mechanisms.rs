@@ -44,7 +44,7 @@ pub fn system(chain: &Chain) -> Model {
     .unwrap()
 }
 
-/// The model with effects that are forces of the state: in MuJoCo dry friction and limits are constraints.
+/// The model, keeping only effects that are forces of the state: in MuJoCo dry friction and limits are constraints.
 pub fn comparable(system: &Model) -> Dynamics {
     let others = ["coulomb_friction", "actuator_saturation"];
     let is_force = |effect: &&FittedEffect| !others.contains(&effect.effect.name.as_str());
@@ -52,7 +52,7 @@ pub fn comparable(system: &Model) -> Dynamics {
     dynamics(system, &effects, SignForm::Exact)
 }
 
-/// MuJoCo's inverse dynamics of a description gives back the torques that a model was moved by.
+/// MuJoCo's inverse dynamics of a description reproduces the torques that moved a model.
 pub fn mujoco_agrees(description: &Path, model: &Dynamics) {
     let n = model.joints;
     let mut rng = rng(1);

@@ -12,7 +12,7 @@ pub const ORACLES: [(&str, Oracle); 4] = [
     ("drive", drive),
 ];
 
-/// Those that are driven by commands, in place of torques.
+/// Systems driven by commands instead of torques.
 pub const COMMANDED: [(&str, Oracle); 2] = [("servo", servo), ("motor", motor)];
 
 fn pendulum(x: &[f64]) -> Vec<f64> {
@@ -87,7 +87,7 @@ fn drive(x: &[f64]) -> Vec<f64> {
     vec![force / m]
 }
 
-/// A link that a spring pulls to its target, no harder than a limit.
+/// A link pulled to its target by a spring with limited torque.
 fn servo(x: &[f64]) -> Vec<f64> {
     let [q, v, target, _, inertia, gravity, stiffness, damping, limit] = x.try_into().unwrap();
     let pull = stiffness * (target - q) - damping * v;
@@ -99,7 +99,7 @@ fn servo(x: &[f64]) -> Vec<f64> {
     vec![(held - gravity * q.sin()) / inertia]
 }
 
-/// A pendulum on a motor whose current is what its voltage leaves beside the voltage that it makes itself.
+/// A pendulum on a motor whose current follows from its voltage minus its back-EMF.
 fn motor(x: &[f64]) -> Vec<f64> {
     let [q, v, volts, _, inertia, gravity, constant, resistance] = x.try_into().unwrap();
     let current = (volts - constant * v) / resistance;

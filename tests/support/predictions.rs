@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use super::catalogue::rng;
 use super::clients::not_in_a_quick_run;
 
-/// What a client predicts; none, said loudly, without a client on this machine.
+/// A client's predictions; `None`, said loudly, if the client is not on this machine.
 pub fn predictions(
     name: &str,
     predict: impl FnOnce() -> Result<Predictions, ClientError>,
@@ -47,7 +47,7 @@ pub fn expected(model: &ExportModel) -> (Samples, Predictions) {
     (samples, own)
 }
 
-/// A model written in a format to a folder of its own.
+/// A model written in a format to its own folder.
 pub fn written(format: &Format, name: &str, model: &ExportModel) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name.replace(' ', "_"));

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-/// A JSON file without what tells the time and how the program was called.
+/// A JSON file without the times and the command line.
 pub fn read(path: &Path, without: &[&str]) -> Value {
     let mut value: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
     for pointer in without {
@@ -15,7 +15,7 @@ pub fn read(path: &Path, without: &[&str]) -> Value {
     value
 }
 
-/// All files below a folder but those that only the run itself uses.
+/// All files below a folder except those that only the run itself uses.
 pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
@@ -30,7 +30,7 @@ pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     found
 }
 
-/// The folders of two runs of an experiment hold the same, but for what tells the time.
+/// The folders of two runs of an experiment are equal, except for times.
 pub fn ended_alike(merged: &Path, whole: &Path) {
     let clock = ["/wall_s", "/command"];
     let results = |out: &Path| read(&out.join("results.json"), &clock);

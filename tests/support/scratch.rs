@@ -28,7 +28,7 @@ impl Scratch {
         text(&path).to_owned()
     }
 
-    /// A log of 2 s of a pendulum, a row every 10 ms; `row` makes q, qd and tau of the time.
+    /// A log of 2 s of a pendulum, a row every 10 ms; `row` gives q, qd and tau at a time.
     pub fn log(&self, name: &str, row: impl Fn(f64) -> [f64; 3]) -> String {
         self.log_at(name, (0..200).map(|row| f64::from(row) * 0.01), row)
     }
@@ -48,7 +48,7 @@ impl Scratch {
         self.file(name, log)
     }
 
-    /// The model of the pendulum with one text in place of another.
+    /// The model of the pendulum with one text replaced by another.
     pub fn model(&self, name: &str, from: &str, to: &str) -> String {
         assert!(PENDULUM.contains(from), "{from}");
         self.file(name, PENDULUM.replacen(from, to, 1))
@@ -59,7 +59,7 @@ impl Scratch {
         self.model(name, "C_g * sin(q1) + C_i * tau1", acceleration)
     }
 
-    /// A file of `configs` with one text in place of another, under its own name.
+    /// A file of `configs` with one text replaced by another, under its own name.
     pub fn changed(&self, file: &str, from: &str, to: &str) -> String {
         let text = fs::read_to_string(config(file)).unwrap();
         assert!(text.contains(from), "{from}");

@@ -36,9 +36,9 @@ pub fn answer(outcome: &Outcome) -> Answer {
         .filter(is_declared)
         .map(|parameter| Estimate::of(&parameter.name, parameter))
         .collect(),
-        left: outcome.remainder.unexplained.fraction,
-        left_p_value: outcome.remainder.unexplained.p_value,
-        left_where: outcome.remainder.unexplained.place.clone(),
+        left: outcome.diagnostics.unexplained.fraction,
+        left_p_value: outcome.diagnostics.unexplained.p_value,
+        left_where: outcome.diagnostics.unexplained.place.clone(),
     }
 }
 
@@ -51,7 +51,7 @@ fn named(finding: &Finding) -> Named {
     }
 }
 
-/// The numbers of an effect, called as in its file; `found` are its parameters as the model has them.
+/// The numbers of an effect, named as in its file; `found` are its parameters in the model.
 pub fn estimates(effect: &FittedEffect, found: &[Parameter]) -> Vec<Estimate> {
     let own = &effect.effect.parameters;
     let common = own.iter().zip(found);

@@ -12,10 +12,10 @@ use super::coverage::Coverage;
 use super::draw::Drawn;
 use super::grid::{Cell, Group, Simulation, Source};
 use super::hidden::Hidden;
+use super::identifiable::Told;
 use super::judge::{Answer, Judgement, Truth, judge};
 use super::machine::Machine;
 use super::mechanics::Pair;
-use super::told::Told;
 use residyn_core::closeloop::{Outcome, Request, Settings, Split, StudyError, close_loop};
 use residyn_core::data::{Log, LogError};
 use residyn_core::model::{Library, Model};
@@ -29,11 +29,11 @@ use residyn_io::read_model;
 pub enum Findings {
     /// Of closing the loop.
     Searched(Box<Searched>),
-    /// Of the fit that is told the true structure.
+    /// Of the fit that is given the true structure.
     Told(KnownStructure),
 }
 
-/// What closing the loop found.
+/// The result of closing the loop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Searched {
     pub truth: Truth,
@@ -42,7 +42,7 @@ pub struct Searched {
     pub errors: Errors,
 }
 
-/// What the fit of the true structure found.
+/// The result of fitting the true structure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KnownStructure {
     pub truth: Truth,
@@ -56,18 +56,18 @@ pub struct KnownStructure {
 pub struct Errors {
     pub before: f64,
     pub after: f64,
-    /// Of the model with the true effects, fitted to the same logs; `None` where the library lacks one of them.
-    pub told: Option<f64>,
+    /// Of the model with the true effects, fitted to the same logs; `None` if the library lacks one of these effects.
+    pub message: Option<f64>,
 }
 
 impl Errors {
-    /// How the error with the effects found compares with that of the true structure.
+    /// The error with the effects found, relative to the true structure's.
     pub fn ratio(&self) -> Option<f64> {
-        self.told.map(|told| self.after / told)
+        self.message.map(|message| self.after / message)
     }
 }
 
-/// All logs but the last to learn from, the last to be judged on.
+/// All logs but the last for training, the last for the test.
 pub fn last_is_test(logs: Vec<Log>) -> Split {
     let mut split = Split::given(logs, Vec::new());
     split.test.extend(split.train.pop());
@@ -75,7 +75,7 @@ pub fn last_is_test(logs: Vec<Log>) -> Split {
 }
 
 impl Cell {
-    /// The cell with its rig drawn, where it is to be drawn.
+    /// The cell with its rig drawn, if it has to be drawn.
     ///
     /// # Errors
     /// A model file that cannot be read, or rules by which no rig can be drawn.
@@ -102,7 +102,7 @@ impl Cell {
         Ok(settled)
     }
 
-    /// Number of joints, where the rig is simulated.
+    /// Number of joints, if the rig is simulated.
     pub fn joints(&self) -> Option<usize> {
         match &self.source {
             Source::Simulated(simulation) => Some(simulation.mechanics.joints()),
@@ -175,7 +175,7 @@ impl Cell {
         (offsets.iter().enumerate().map(record).collect(), truth)
     }
 
-    /// Cells share neither their motions nor their noise.
+    /// Each cell has its own motion and noise.
     fn rng(&self) -> ChaCha8Rng {
         ChaCha8Rng::seed_from_u64(content_hash(self.id.as_bytes()))
     }
@@ -190,7 +190,7 @@ impl Cell {
         offset
     }
 
-    /// Record the logs, close the loop or fit the structure that is told, judge.
+    /// Record the logs, close the loop or fit the given structure, judge.
     ///
     /// # Errors
     /// A model file or log that cannot be read, or logs on which closing the loop fails.
@@ -200,21 +200,21 @@ impl Cell {
         let split = last_is_test(logs);
         let settings = Settings::default();
         let (effects, known) = (&self.effects, &truth.declared);
-        // What an arm is told is compared by torques, which this fit knows nothing of.
-        let told = match self.source {
+        // Arms are compared by torques, which this fit does not handle.
+        let message = match self.source {
             Source::Arm(_) => None,
             _ => Told::fit(&model, library, &split, &settings, effects, known),
         };
         if self.group == Group::Told {
-            let told = told.context("the true structure cannot be fitted")?;
+            let message = message.context("the true structure cannot be fitted")?;
             return Ok(Findings::Told(KnownStructure {
-                error: told.error(),
-                coverage: told.coverage(&truth)?,
+                error: message.error(),
+                coverage: message.coverage(&truth)?,
                 truth,
             }));
         }
         if self.group == Group::Several {
-            truth.twins = told.as_ref().map(Told::twins).unwrap_or_default();
+            truth.twins = message.as_ref().map(Told::twins).unwrap_or_default();
         }
         let outcome = close(&model, library, split.clone(), self.seed)?;
         let answer = answer(&outcome);
@@ -223,7 +223,7 @@ impl Cell {
             errors: Errors {
                 before: outcome.errors.before.position_rms(),
                 after: outcome.errors.after.position_rms(),
-                told: told.map(|told| told.error()),
+                message: message.map(|message| message.error()),
             },
             truth,
             answer,
@@ -231,7 +231,7 @@ impl Cell {
     }
 }
 
-/// What is tested.
+/// The method under test.
 fn close(model: &Model, library: &Library, split: Split, seed: u64) -> Result<Outcome, StudyError> {
     let request = Request::new(model, library, split);
     close_loop(request, &mut ChaCha8Rng::seed_from_u64(seed), &())

@@ -5,7 +5,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::sensors::Flaws;
 use residyn_core::limits::{LOG_ROWS, RUNS, SIMULATED_S, check_readings};
 
-/// How a rig is driven; one number a joint in every list.
+/// How a rig is driven; every list has one number per joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Driving {
@@ -34,7 +34,7 @@ pub enum Loop {
     Chirp,
     /// A torque that jumps and stays.
     Steps,
-    /// Let go from up to twice the reference's size, under half of the torque of the open loop.
+    /// Released from up to twice the reference's size, under half the open-loop torque.
     Release,
 }
 
@@ -42,7 +42,7 @@ pub enum Loop {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
-    /// Of the logs in turn.
+    /// How the logs are driven, in turn.
     #[serde(rename = "loop", deserialize_with = "one_or_more")]
     pub drive: Vec<Loop>,
     pub rate_hz: f64,
@@ -58,7 +58,7 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// Whether logs can be taken so.
+    /// Whether logs can be taken under this condition.
     ///
     /// # Errors
     /// Why not.
@@ -82,10 +82,10 @@ impl Condition {
     }
 }
 
-/// Whether logs of so many seconds can be taken at this rate.
+/// Whether logs of these lengths can be taken at this rate.
 ///
 /// # Errors
-/// Logs that are longer than any.
+/// Logs that are longer than the limit.
 pub(super) fn check_rows(rate_hz: f64, seconds: &[f64]) -> Result<(), String> {
     let fits = |seconds: &f64| *seconds <= SIMULATED_S && seconds * rate_hz <= LOG_ROWS as f64;
     match seconds.iter().find(|seconds| !fits(seconds)) {

@@ -17,7 +17,7 @@ pub struct Coverage {
     pub covered: bool,
 }
 
-/// Which intervals hold the truth, of these effects and of declared parameters. Intervals are only meaningful for the
+/// Which intervals of these effects and of declared parameters hold the truth. Intervals are meaningful only for the
 /// true structure.
 pub fn coverage(
     truth: &Truth,
@@ -44,7 +44,7 @@ pub fn coverage(
     all
 }
 
-/// A ripple is the same with the other sign of its amplitude and half a turn more of phase, and with any whole number
+/// A ripple stays the same if its amplitude changes sign and its phase advances by half a turn, or by any whole number
 /// of turns: this picks the form of the truth.
 fn turn_ripple(estimates: &mut [Estimate], truth: &BTreeMap<String, f64>) {
     let amplitude = estimates.iter().find(|e| e.name == "A");

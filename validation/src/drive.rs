@@ -1,7 +1,7 @@
 /// A drive between commanded and acting torque: delay, first-order lag, then the nonlinearities of [`Shape`] in the order of its fields.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Drive {
-    /// \[s\], any real number.
+    /// \[s\], not necessarily whole steps.
     pub delay: f64,
     /// Time constant \[s\]; 0 for none.
     pub lag: f64,
@@ -17,7 +17,7 @@ pub struct Shape {
     pub deadzone: f64,
     /// Largest torque \[N m\].
     pub limit: f64,
-    /// By how much the limit falls with speed in the direction of the torque \[N m s/rad\].
+    /// Decrease of the limit with speed in the direction of the torque \[N m s/rad\].
     pub back_emf: f64,
 }
 
@@ -33,7 +33,7 @@ impl Default for Shape {
 }
 
 impl Shape {
-    /// Torque \[N m\] for a commanded one while the motor turns at `v` \[rad/s\].
+    /// Acting torque \[N m\] for a commanded `torque` while the motor turns at `v` \[rad/s\].
     pub fn at(&self, torque: f64, v: f64) -> f64 {
         let torque = (1.0 + self.gain) * torque;
         let size = (torque.abs() - self.deadzone).max(0.0);

@@ -2,7 +2,8 @@ use std::f64::consts::{SQRT_2, TAU};
 
 use rand::{Rng, RngExt};
 
-/// A multisine with random phases: one frequency in each of equally wide slices of the band on a logarithmic scale.
+/// A multisine with random phases: the band is divided into slices of equal width on a logarithmic scale, with one
+/// frequency in each.
 #[derive(Debug, Clone)]
 pub struct Multisine {
     /// Amplitude, angular frequency \[rad/s\], phase \[rad\].
@@ -68,7 +69,7 @@ impl Chirp {
 /// A value that jumps and stays.
 #[derive(Debug, Clone)]
 pub struct Steps {
-    /// Until when \[s\] each value holds.
+    /// Each value and the time \[s\] until which it holds.
     values: Vec<(f64, f64)>,
 }
 
@@ -78,7 +79,7 @@ impl Steps {
         let (mut until, mut values) = (0.0, Vec::new());
         while until <= seconds {
             until += 0.5 / (low * (high / low).powf(rng.random::<f64>()));
-            // The root mean square of a uniform distribution is its half width by the root of 3.
+            // The root mean square of a uniform distribution is its half-width divided by the root of 3.
             values.push((until, 3.0_f64.sqrt() * size * rng.random_range(-1.0..=1.0)));
         }
         Self { values }
@@ -90,7 +91,7 @@ impl Steps {
     }
 }
 
-/// The position controller of a simple rig: a PD controller that sees the measured angle alone.
+/// The position controller of a simple rig: a PD controller that sees only the measured angle.
 #[derive(Debug, Clone)]
 pub struct Controller {
     /// \[N m/rad\]
@@ -103,7 +104,7 @@ pub struct Controller {
     speed: f64,
 }
 
-/// Time constant of the filter behind the difference quotient \[s\].
+/// Time constant of the filter after the difference quotient \[s\].
 const FILTER_S: f64 = 0.01;
 
 impl Controller {

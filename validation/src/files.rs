@@ -9,7 +9,7 @@ use super::grid::{Cell, GridError, Group, Source, id};
 use super::hidden::Hidden;
 use residyn_io::files::{beside_or_named, read_text};
 
-/// The contents of `cell.json`: what is known of the logs beside it.
+/// The contents of `cell.json`: what is known of the logs next to it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Described {
@@ -17,7 +17,7 @@ struct Described {
     plant: String,
     /// The program that recorded the logs.
     recorded_by: String,
-    /// A model file, as seen from the grid, or the name of a built-in system.
+    /// A model file, relative to the grid, or the name of a built-in system.
     model: PathBuf,
     effects: Vec<Hidden>,
     logs: Vec<PathBuf>,
@@ -25,7 +25,7 @@ struct Described {
     declared: BTreeMap<String, f64>,
 }
 
-/// One cell for each folder in `folder`, in the order of their names; model files are looked for beside `grid`.
+/// One cell for each folder in `folder`, in the order of their names; model files are relative to `grid`.
 ///
 /// # Errors
 /// A folder without a readable `cell.json`.

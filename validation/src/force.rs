@@ -29,7 +29,7 @@ pub enum Force {
     Constant {
         tau_0: f64,
     },
-    /// Ripple over the angle; that of an effect file has a whole number of periods a turn.
+    /// Ripple over the angle; the ripple of an effect file has a whole number of periods per turn.
     Ripple {
         amplitude: f64,
         periods: f64,

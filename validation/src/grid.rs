@@ -28,7 +28,7 @@ pub enum GridError {
     File { path: PathBuf, message: String },
 }
 
-/// What a series of cells tests.
+/// The test that a series of cells makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {
@@ -38,11 +38,11 @@ pub enum Group {
     Pair,
     /// Two to five are missing in a rig drawn by chance and all have to be named.
     Several,
-    /// As many; the program is told which, and its intervals have to hold the truth.
+    /// As above, but the program is told which, and its intervals have to hold the truth.
     Told,
     /// Nothing is missing and nothing may be named.
     None,
-    /// Something is missing that the library does not know; it has to be flagged.
+    /// An effect that the library lacks is missing; it has to be flagged.
     Outside,
 }
 
@@ -54,12 +54,12 @@ struct Plant {
     model: PathBuf,
     mechanics: Mechanics,
     driving: Driving,
-    /// Typical top speed of each joint \[rad/s\], by which effects are drawn.
+    /// Typical top speed of each joint \[rad/s\], which scales the drawn effects.
     #[serde(default)]
     speed: Vec<f64>,
 }
 
-/// Rigs drawn by chance: each of these numbers of effects on each of the plants in turn.
+/// Rigs drawn at random: each number of effects on each plant in turn.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Draws {
@@ -69,20 +69,20 @@ struct Draws {
     plants: Vec<String>,
     /// First and last number of its cells.
     numbers: [u64; 2],
-    /// How many effects of the library a rig hides.
+    /// How many library effects a rig hides.
     effects: Vec<usize>,
-    /// How many others.
+    /// How many effects from outside the library it hides.
     #[serde(default)]
     outside: usize,
 }
 
-/// Arms of many joints: what each of them lacks is drawn by chance, of these kinds in turn.
+/// Arms of many joints: what each model lacks is drawn at random, from these kinds in turn.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Arms {
-    /// The part of a cell's name before what is hidden and its number.
+    /// The part of a cell's name before the kind of effect and the number.
     name: String,
-    /// A model file, as seen from the grid.
+    /// A model file, relative to the grid.
     model: PathBuf,
     lacks: Vec<Lacks>,
     /// First and last number of the cells of each kind.
@@ -135,7 +135,7 @@ pub struct Cell {
     pub seed: u64,
     /// A model file, or the name of a built-in system.
     pub model: PathBuf,
-    /// Values of declared parameters in place of those of the model file.
+    /// Values of declared parameters in place of the model file's.
     #[serde(default)]
     pub start: BTreeMap<String, f64>,
     pub source: Source,
@@ -153,16 +153,16 @@ pub struct Simulation {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
-    /// Recorded when they are asked for.
+    /// Recorded on demand.
     Simulated(Box<Simulation>),
-    /// A rig that is drawn when it is asked for.
+    /// A rig that is drawn on demand.
     Drawn(Box<Recipe>),
-    /// An arm, whose effects are drawn when it is asked for.
+    /// An arm, whose effects are drawn on demand.
     Arm(Box<Arm>),
     /// Recorded by another program.
     Files {
         logs: Vec<PathBuf>,
-        /// True values of declared parameters, where the rig fixes them.
+        /// True values of declared parameters, if the rig fixes them.
         declared: BTreeMap<String, f64>,
     },
 }
@@ -179,7 +179,7 @@ pub fn read(path: &Path) -> Result<Vec<Cell>, GridError> {
     cells(path, &text)
 }
 
-/// The cells of the grid in `text`; files that it names are looked for beside `path`.
+/// The cells of the grid in `text`; file names in it are relative to `path`.
 ///
 /// # Errors
 /// As [`read`].
@@ -248,7 +248,7 @@ impl File {
         }
     }
 
-    /// How many cells it has.
+    /// Number of cells.
     fn count(&self) -> usize {
         let all = |counts: &[usize]| {
             counts
@@ -484,9 +484,9 @@ mod tests {
             ("[0, 9223372036854775807]", "9223372036854775812"),
             ("[1, 20001]", "20005"),
         ] {
-            let told = message(&format!("{GRID}\n{draws}numbers = {numbers}\n"));
+            let message = message(&format!("{GRID}\n{draws}numbers = {numbers}\n"));
             let expected = format!("has {found} cells; at most 20000 are run");
-            assert!(told.contains(&expected), "{told}");
+            assert!(message.contains(&expected), "{message}");
         }
     }
 }

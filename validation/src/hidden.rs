@@ -11,7 +11,7 @@ use super::mechanics::Mechanics;
 use super::transmission::Transmission;
 use residyn_core::data::Joint;
 
-/// `coulomb_friction@1`; of a shift `parameter_shift(m1)`.
+/// `coulomb_friction@1`; for a shift, `parameter_shift(m1)`.
 pub type Label = String;
 
 pub fn label(name: &str, joint: Joint, parameter: &str) -> Label {
@@ -21,13 +21,13 @@ pub fn label(name: &str, joint: Joint, parameter: &str) -> Label {
     }
 }
 
-/// One effect that a rig has and its model does not declare.
+/// An effect that a rig has and its model does not declare.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Hidden {
     pub name: String,
     pub joint: Joint,
-    /// Its numbers, in N m, rad and s; of a shift, the parameter's true value; of a sensor's offset, the
-    /// spread `q_z` over the logs.
+    /// Its numbers, in N m, rad and s; for a shift, the parameter's true value; for a sensor offset, the spread `q_z`
+    /// over the logs.
     #[serde(flatten)]
     pub values: BTreeMap<String, f64>,
 }
@@ -178,7 +178,7 @@ impl Machine {
                 self.transmissions[j] = Some(Transmission::compliance(stiffness, inertia));
             }
             "encoder_eccentricity" => self.eccentricity[j] = [n("e_s")?, n("e_c")?],
-            // Of the sensor, not of the machine: each log draws its own.
+            // A property of the sensor, not of the machine: each log draws its own.
             "sensor_offset" => drop(n("q_z")?),
             name => return Err(format!("`{name}` is no effect of joint {}", hidden.joint)),
         }
@@ -215,7 +215,7 @@ mod tests {
         }
     }
 
-    /// Acceleration of the first joint at a state, under a torque, with this effect less that without.
+    /// Change of the first joint's acceleration due to this effect, at one state and torque.
     fn adds(effect: &Hidden) -> f64 {
         let state = State {
             q: [0.4, 0.3],

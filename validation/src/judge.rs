@@ -16,9 +16,9 @@ use residyn_core::closeloop::Verdict;
 pub struct Truth {
     /// Each with the true values of its parameters.
     pub effects: Vec<(Label, BTreeMap<String, f64>)>,
-    /// True values of declared parameters, where the rig fixes them.
+    /// True values of declared parameters, if the rig fixes them.
     pub declared: BTreeMap<String, f64>,
-    /// Other sets of effects that the logs do not tell from these: as right.
+    /// Other sets of effects that the logs cannot distinguish from these: they count as right.
     #[serde(default)]
     pub twins: Vec<Vec<Label>>,
 }
@@ -35,10 +35,10 @@ pub struct Estimate {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Named {
     pub label: Label,
-    /// Called as in the effect's file.
+    /// Named as in the effect's file.
     pub parameters: Vec<Estimate>,
     pub p_value: f64,
-    /// Share of the error that comes back without it.
+    /// Share of the error that returns without it.
     pub error_reduction: Option<f64>,
 }
 
@@ -51,7 +51,7 @@ pub struct Answer {
     /// Sets of effects that are listed as alternatives.
     pub alternatives: Vec<Vec<Label>>,
     pub declared: Vec<Estimate>,
-    /// The reported remainder: its share, its p-value, and what it depends on.
+    /// The reported unexplained residual: its share, its p-value, and what it depends on.
     pub left: f64,
     pub left_p_value: f64,
     pub left_where: String,
@@ -67,27 +67,28 @@ impl Answer {
 /// The answer compared with the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Judgement {
-    /// The true effects, or a set that the logs do not tell from them, were named, each on its joint, and nothing else.
+    /// The true effects, or a set that the logs cannot distinguish from them, were named, each on its joint, and
+    /// nothing else.
     pub exact: bool,
-    /// The same after swapping named effects for alternatives that were listed with them.
+    /// As `exact`, after swapping named effects for alternatives that were listed with them.
     pub within: bool,
     /// Effects that were named and are absent.
     pub wrong: Vec<Label>,
     /// Effects that are present and were not named.
     pub missed: Vec<Label>,
-    /// A significant remainder is reported.
+    /// A significant unexplained residual is reported.
     pub flagged: bool,
-    /// Effects that were named, are absent, and cut less than half of the error.
+    /// Effects that were named, are absent, and reduce the error by less than half.
     pub weak: Vec<Label>,
-    /// Of the parameters of true effects that were named; of effects by `name`, of declared parameters as
-    /// they are called.
+    /// Coverage of the parameters of true effects that were named, as `label.name`, and of declared parameters, by
+    /// their names.
     pub coverage: Vec<Coverage>,
     /// The cell meets the criterion of its group.
     pub passed: bool,
 }
 
-/// An effect that cuts less than this share of the error explains nothing in a rig that hides what no effect
-/// describes.
+/// An effect that reduces the error by less than this share explains nothing in a rig whose hidden effect the library
+/// lacks.
 const HALF: f64 = 0.5;
 
 /// The name of a parameter's value in a single log: `q_z[log1.csv]`.
@@ -95,7 +96,7 @@ pub fn of_log(parameter: &str, log: &str) -> String {
     format!("{parameter}[{log}]")
 }
 
-/// An effect's numbers; of an offset what it was in each log.
+/// An effect's numbers; for an offset, its value in each log.
 fn values(effect: &Hidden, offsets: &[Pair]) -> BTreeMap<String, f64> {
     if effect.name != "sensor_offset" {
         return effect.values.clone();
@@ -105,7 +106,7 @@ fn values(effect: &Hidden, offsets: &[Pair]) -> BTreeMap<String, f64> {
 }
 
 impl Truth {
-    /// Of a rig with these effects and `declared` parameters, whose encoders read too much by `offsets` rad,
+    /// The truth about a rig with these effects and `declared` parameters, whose encoders read high by `offsets` rad,
     /// `[log][joint]`.
     pub fn of(effects: &[Hidden], declared: BTreeMap<String, f64>, offsets: &[Pair]) -> Self {
         Self {
@@ -118,7 +119,7 @@ impl Truth {
         }
     }
 
-    /// Of the true set of effects and its twins the one that has most in common with those `named`.
+    /// The set, among the true one and its twins, that has most in common with the `named` effects.
     fn nearest(&self, named: &[Label]) -> Vec<Label> {
         let off = |set: &Vec<Label>| without(set, named).len() + without(named, set).len();
         let sets = std::iter::once(self.labels()).chain(self.twins.iter().cloned());

@@ -1,8 +1,8 @@
 //! Whether closing the loop names what is missing: a grid of simulated rigs that hide effects.
 //!
-//! The rigs share nothing with what is measured: equations of motion, friction with exact stiction, drives,
-//! gears and encoders are written by hand here, and no model file, formula or integrator of the program is used
-//! until the logs are recorded.
+//! The rigs share nothing with the program under test: equations of motion, friction with exact stiction, drives, gears
+//! and encoders are written by hand here, and none of the program's model files, formulas or integrators is used until
+//! the logs are recorded.
 
 mod answer;
 mod arm;
@@ -17,6 +17,7 @@ mod force;
 mod friction;
 mod grid;
 mod hidden;
+mod identifiable;
 mod judge;
 mod machine;
 mod mechanics;
@@ -26,7 +27,6 @@ pub mod rigs;
 mod rows;
 mod sensors;
 mod table;
-mod told;
 mod transmission;
 mod wires;
 

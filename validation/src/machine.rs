@@ -20,7 +20,7 @@ pub struct Machine {
     pub presliding: Vec<(usize, Presliding)>,
     pub transmissions: [Option<Transmission>; 2],
     pub drives: [Drive; 2],
-    /// By how much each encoder reads too much \[rad\]: the parts that follow the sine and the cosine of its angle.
+    /// Amount by which each encoder reads high \[rad\]: the parts that follow the sine and the cosine of its angle.
     pub eccentricity: [Pair; 2],
 }
 
@@ -57,7 +57,7 @@ impl State {
     }
 }
 
-/// Direction of motion of each joint: 1, -1, or 0 where friction holds it.
+/// Direction of motion of each joint: 1, -1, or 0 if friction holds it.
 pub(super) type Directions = Pair;
 
 /// The torques at one instant, without dry friction.
@@ -90,14 +90,14 @@ impl Machine {
         self.mechanics.joints()
     }
 
-    /// True values of declared parameters; a motor behind a gear turns with its link on the whole.
+    /// True values of declared parameters; on average, a motor behind a gear turns with its link.
     pub fn declared(&self) -> BTreeMap<String, f64> {
         let motor = self.transmissions[0].as_ref().map_or(0.0, |t| t.inertia);
         self.mechanics.declared(self.rotor[0] + motor)
     }
 
-    /// What the encoders read: angles of the motors where a transmission follows, else those of the joints, by discs
-    /// that may be off their axes.
+    /// The encoder readings: angles of the motors if a transmission follows, else of the joints, read from discs that
+    /// may be off their axes.
     pub fn encoders(&self, state: &State) -> Pair {
         [0, 1].map(|j| {
             let angle = match self.transmissions[j] {
@@ -150,7 +150,7 @@ impl Machine {
         balance
     }
 
-    /// Total level of dry friction of a joint against motion in `direction` \[N m\].
+    /// Total dry-friction level of a joint against motion in `direction` \[N m\].
     fn level(&self, joint: usize, direction: f64, state: &State, load: f64) -> f64 {
         let own = self.dry.iter().filter(|(of, _)| *of == joint);
         own.map(|(_, friction)| friction.level(direction, state.q[joint], state.v[joint], load))
@@ -175,8 +175,8 @@ impl Machine {
         (a, held)
     }
 
-    /// The directions of joints in motion, and for those at rest the only ones that agree with the forces: held
-    /// where friction can carry what the other torques leave, else sliding the way they push.
+    /// The directions of joints in motion, and for joints at rest the only directions consistent with the forces: held
+    /// if friction can carry the net torque, else sliding the way it acts.
     pub(super) fn directions(
         &self,
         time: f64,
@@ -237,7 +237,7 @@ impl Machine {
     }
 }
 
-/// Accelerations under `acting` torques, of the joints that are free; the others have none.
+/// Accelerations of the free joints under `acting` torques; the other joints have none.
 fn solve(mass: &[Pair; 2], acting: Pair, free: [bool; 2]) -> Pair {
     match free {
         [true, true] => {

@@ -92,7 +92,7 @@ impl Mechanics {
         }
     }
 
-    /// Give a parameter another value; `None` where there is no such parameter.
+    /// Give a parameter another value; `None` if there is no such parameter.
     pub fn set(&mut self, name: &str, value: f64) -> Option<()> {
         let slot = match (self, name) {
             (Self::Pendulum { inertia, .. }, "inertia") => inertia,
@@ -111,8 +111,8 @@ impl Mechanics {
         Some(())
     }
 
-    /// True values of the parameters that a declared model names otherwise and that its logs determine, where the
-    /// first joint turns a rotor of inertia `rotor` \[kg m^2\] as well.
+    /// True values of the parameters that a declared model names differently and that its logs determine, with a rotor
+    /// of inertia `rotor` \[kg m^2\] on the first joint.
     pub fn declared(&self, rotor: f64) -> BTreeMap<String, f64> {
         match *self {
             Self::Pendulum { inertia, moment, g } => [

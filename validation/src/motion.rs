@@ -3,9 +3,9 @@
 use super::drive::Approach;
 use super::machine::{Directions, Machine, State};
 
-/// Step length \[s\]: halving it changes nothing that a sensor could resolve (tested).
+/// Step length \[s\]: halving it changes nothing that a sensor could resolve (tested below).
 pub const STEP_S: f64 = 1e-4;
-/// Bisections by which the instant is located at which a joint stops.
+/// Number of bisections that locate the instant at which a joint stops.
 const HALVINGS: usize = 40;
 
 impl Machine {
@@ -19,7 +19,7 @@ impl Machine {
         step_s: f64,
     ) {
         let mut passed = 0.0;
-        // A remainder below a femtosecond is rounding.
+        // A remaining time below a femtosecond is rounding.
         while duration - passed > 1e-15 {
             let step = step_s.min(duration - passed);
             passed += self.step(state, from + passed, step, commands);
@@ -79,7 +79,7 @@ impl Machine {
     }
 }
 
-/// The shortest length for which `has_happened`, which it has for `long`.
+/// The shortest length for which `has_happened` holds, as it does for `long`.
 fn halve(long: f64, has_happened: impl Fn(f64) -> bool) -> f64 {
     let (mut short, mut long) = (0.0, long);
     for _ in 0..HALVINGS {
@@ -172,7 +172,7 @@ mod tests {
             let before = energy(&mechanics, state.q, state.v);
             let start = state.q;
             machine.advance(&mut state, 0.0, 3.0, &constant(torque), STEP_S);
-            // Constant torques work along the angle alone.
+            // The work of a constant torque depends only on the angle.
             let work: f64 = (0..2).map(|j| torque[j] * (state.q[j] - start[j])).sum();
             let gained = energy(&mechanics, state.q, state.v) - before;
             assert!((gained - work).abs() < 1e-8, "{gained} gained by {work}");
@@ -272,12 +272,12 @@ mod tests {
         let mut state = State::at_rest([0.0; 2]);
         machine.advance(&mut state, 0.0, 2e-3, &constant([0.5, 0.0]), STEP_S);
         assert_eq!(state.q[0], 0.0);
-        // The motor alone: half of torque over inertia times the square of the time.
+        // The motor alone: half of torque over inertia, times time squared.
         assert!((state.motor_q[0] - 0.5 * 0.5 / 0.002 * 4e-6).abs() < 1e-9);
         machine.forces.push((0, Force::Viscous { b: 1.0 }));
         machine.advance(&mut state, 2e-3, 10.0, &constant([0.5, 0.0]), STEP_S);
         let ahead = state.motor_q[0] - state.q[0];
-        // Half of the play, and what the contact gives way.
+        // Half of the play, plus the deflection of the contact.
         assert!((ahead - (0.01 + 0.5 / 2000.0)).abs() < 1e-6, "{ahead}");
         assert_eq!(machine.encoders(&state)[0], state.motor_q[0]);
         assert!((machine.declared()["C_i"] - 1.0 / 0.152).abs() < 1e-12);

@@ -13,11 +13,10 @@ use super::sensors::{Clock, Losses, Speed, sensed};
 use super::wires::Wires;
 use residyn_core::data::Log;
 
-/// Logs differ in how hard the rig is driven; the last of them lies within the range of the others where there
-/// are more than two.
+/// Logs differ in how hard the rig is driven; with more than two logs, the last lies within the range of the others.
 const STRENGTHS: [f64; 6] = [1.2, 0.5, 0.8, 1.0, 0.7, 0.9];
 
-/// Where the torque comes from.
+/// The source of the torque.
 enum Source {
     Multisine(Multisine),
     Chirp(Chirp),
@@ -62,7 +61,7 @@ struct Effort {
     seconds: f64,
 }
 
-/// The state from which a log begins: at rest, hanging down, or where the rig is let go.
+/// The state at which a log begins: at rest, hanging down or where the rig is released.
 fn start(driving: &Driving, how: Loop, strength: f64, rng: &mut impl Rng) -> State {
     let mut q = [0.0; 2];
     if how == Loop::Release {
@@ -75,9 +74,9 @@ fn start(driving: &Driving, how: Loop, strength: f64, rng: &mut impl Rng) -> Sta
 }
 
 impl Machine {
-    /// Record the `index`-th log of a rig that starts at rest; encoders read too much by `offset` rad. Velocities
-    /// are filtered backward differences of what the encoders read. Rows that are lost are not in the log, while the
-    /// rig and its controller go on.
+    /// Record the `index`-th log of a rig that starts at rest; encoders read high by `offset` rad. Velocities are
+    /// filtered backward differences of the encoder readings. Lost rows are not in the log, while the rig and its
+    /// controller continue.
     pub fn record(
         &self,
         driving: &Driving,
@@ -105,7 +104,7 @@ impl Machine {
         let mut log = empty(index, joints);
         let (mut time, mut dt) = (0.0, 1.0 / condition.rate_hz);
         for row in 0..rows {
-            // The first and the last row are there, so that the log is as long as it was meant to be.
+            // The first and the last row are always kept, so that the log has its intended length.
             let kept = !losses.next(rng) || row == 0 || row == rows - 1;
             let encoders = self.encoders(&state);
             let mut command = [0.0; 2];
@@ -131,7 +130,7 @@ impl Machine {
         log
     }
 
-    /// Integrates from one reading to the next \[s\], split where a command arrives at a drive.
+    /// Integrates from one reading to the next \[s\], split when a command arrives at a drive.
     fn hold(&self, state: &mut State, wires: &mut Wires, from: f64, to: f64) {
         for span in wires.cuts(self, from, to).windows(2) {
             let given = wires.given(self, span[0]);
@@ -223,7 +222,7 @@ mod tests {
         let mut condition = condition(Loop::Open);
         condition.seconds = 1.0;
         let log = record(&machine, &condition, 0.0);
-        // Speed is the sum of torque by time: of step k, 3.7 ms of command k - 2 and 6.3 ms of k - 1.
+        // Speed is the sum of torque times time: in step k, 3.7 ms of command k - 2 and 6.3 ms of k - 1.
         let command = |k: usize, back: usize| k.checked_sub(back).map_or(0.0, |k| log.tau[0][k]);
         let (mut q, mut v) = (0.0, 0.0);
         for row in 0..log.rows() {
@@ -310,7 +309,7 @@ mod tests {
         let lost = whole.rows() - lossy.rows();
         assert!((20..70).contains(&lost), "{lost}");
         assert_eq!(lossy.duration(), whole.duration());
-        // What is left is what was there: the controller has seen the lost rows, and the rig has moved under it.
+        // The remaining rows are unchanged: the controller has seen the lost rows, and the rig has moved under it.
         for (row, time) in lossy.time.iter().enumerate() {
             let there = whole.time.iter().position(|t| t == time).unwrap();
             let of = |log: &Log, row: usize| [log.q[0][row], log.qd[0][row], log.tau[0][row]];

@@ -54,27 +54,27 @@ impl Row {
     }
 }
 
-/// The error after is as small as that of the true structure when it exceeds it by no more than this.
+/// The error after closing the loop counts as equally small if it is at most this factor times the true structure's.
 const AS_GOOD: f64 = 1.1;
 
-/// A cell on which closing the loop failed counts as not passed wherever it counts.
+/// A cell that was run; if closing the loop failed on it, it counts as not passed everywhere.
 pub struct Done<'l> {
     pub cell: &'l Cell,
     pub findings: Option<&'l Searched>,
-    pub told: Option<&'l KnownStructure>,
+    pub message: Option<&'l KnownStructure>,
 }
 
 impl<'l> Done<'l> {
     pub fn of(line: &'l Line) -> Self {
-        let (findings, told) = match &line.findings {
+        let (findings, message) = match &line.findings {
             Ok(Findings::Searched(searched)) => (Some(&**searched), None),
-            Ok(Findings::Told(told)) => (None, Some(told)),
+            Ok(Findings::Told(message)) => (None, Some(message)),
             Err(_) => (None, None),
         };
         Self {
             cell: &line.cell,
             findings,
-            told,
+            message,
         }
     }
 
@@ -86,11 +86,11 @@ impl<'l> Done<'l> {
         self.findings?.errors.ratio()
     }
 
-    /// Of the effects that were named, or of those that the fit was told.
+    /// Coverage of the effects that were named, or of those that the fit was told.
     pub fn coverage(&self) -> &[Coverage] {
         let named = self.findings.map(|f| &f.judgement.coverage);
-        let told = self.told.map(|told| &told.coverage);
-        named.or(told).map_or(&[], Vec::as_slice)
+        let message = self.message.map(|message| &message.coverage);
+        named.or(message).map_or(&[], Vec::as_slice)
     }
 
     pub fn is_told(&self) -> bool {
@@ -98,7 +98,7 @@ impl<'l> Done<'l> {
     }
 }
 
-/// How often the answer was right, by what was asked; `ratios` are errors over those of the true structure.
+/// How often the answer was right, by question; `ratios` are errors divided by the true structure's.
 pub fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
     let of = |group: Group, hit: &dyn Fn(&Done<'_>) -> bool| {
         Rate::count(done.iter().filter(|d| d.cell.group == group).map(hit))
@@ -106,7 +106,7 @@ pub fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
     let exact = |d: &Done<'_>| d.shows(|j| j.exact);
     let within = |d: &Done<'_>| d.shows(|j| j.within);
     let named = |d: &Done<'_>| !d.findings.is_some_and(|f| f.answer.named.is_empty());
-    let flagged_in_vain = |d: &Done<'_>| !d.shows(|j| !j.flagged);
+    let false_alarms = |d: &Done<'_>| !d.shows(|j| !j.flagged);
     let flagged = |d: &Done<'_>| d.shows(|j| j.flagged);
     let passed = |d: &Done<'_>| d.shows(|j| j.passed);
     let mut rows = vec![
@@ -126,7 +126,7 @@ pub fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
         Row::new("no effect: something is named", of(Group::None, &named)),
         Row::new(
             "no effect: something is flagged",
-            of(Group::None, &flagged_in_vain),
+            of(Group::None, &false_alarms),
         ),
         Row::new(
             "no effect: nothing is named, nothing flagged",
@@ -190,10 +190,10 @@ fn rows_of_several(done: &[Done<'_>]) -> Vec<Row> {
     ]
 }
 
-/// Intervals that hold the truth: of what was named and, apart from it, of structures that were told.
+/// Intervals that hold the truth: for named effects and, separately, for structures that the fit was told.
 fn rows_of_intervals(done: &[Done<'_>]) -> Vec<Row> {
-    let covered = |told: bool, of_effects: bool| {
-        let cells = done.iter().filter(|d| d.is_told() == told);
+    let covered = |message: bool, of_effects: bool| {
+        let cells = done.iter().filter(|d| d.is_told() == message);
         let all = cells.flat_map(Done::coverage);
         let wanted = all.filter(|c| c.name.contains('.') == of_effects);
         Rate::count(wanted.map(|c| c.covered))
@@ -201,7 +201,7 @@ fn rows_of_intervals(done: &[Done<'_>]) -> Vec<Row> {
     let fitted = done
         .iter()
         .filter(|d| d.is_told())
-        .map(|d| d.told.is_some());
+        .map(|d| d.message.is_some());
     vec![
         Row::new(
             "95 % intervals of effects that hold the truth",
@@ -211,13 +211,13 @@ fn rows_of_intervals(done: &[Done<'_>]) -> Vec<Row> {
             "95 % intervals of declared parameters that hold the truth",
             covered(false, false),
         ),
-        Row::new("told the structure: fitted", Rate::count(fitted)),
+        Row::new("message the structure: fitted", Rate::count(fitted)),
         Row::new(
-            "told the structure: 95 % intervals of effects that hold the truth",
+            "message the structure: 95 % intervals of effects that hold the truth",
             covered(true, true),
         ),
         Row::new(
-            "told the structure: 95 % intervals of declared parameters that hold the truth",
+            "message the structure: 95 % intervals of declared parameters that hold the truth",
             covered(true, false),
         ),
     ]

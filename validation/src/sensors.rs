@@ -10,22 +10,22 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Flaws {
-    /// Standard deviation of the time between two rows, as a share of it.
+    /// Standard deviation of the time between two rows, as a share of that time.
     pub jitter: f64,
     /// Share of the rows that are lost.
     pub dropped: f64,
-    /// Rows that are lost at once, at most.
+    /// Largest number of rows lost at once.
     pub burst: usize,
-    /// Standard deviation of the logged torque, and the step in which it is logged, zero for a fine one: in parts of the
-    /// largest torque of the joint.
+    /// Standard deviation of the logged torque, and the step in which it is logged (zero for a fine one), as shares of
+    /// the joint's largest torque.
     pub torque_noise: f64,
     pub torque_quantum: f64,
-    /// Time constant of the filter behind the difference quotient of the positions \[s\].
+    /// Time constant of the filter after the difference quotient of the positions \[s\].
     pub filter_s: f64,
 }
 
 impl Flaws {
-    /// Whether a logger can have them.
+    /// Whether a logger can have these flaws.
     ///
     /// # Errors
     /// Why not.
@@ -44,7 +44,7 @@ impl Flaws {
         if sound { Ok(()) } else { Err(needs.to_owned()) }
     }
 
-    /// What is logged of a command to a joint whose largest torque is `limit` \[N m\].
+    /// The logged value of a command to a joint whose largest torque is `limit` \[N m\].
     pub fn torque(&self, command: f64, limit: f64, rng: &mut impl Rng) -> f64 {
         match (self.torque_noise, self.torque_quantum) {
             (0.0, 0.0) => command,
@@ -53,14 +53,14 @@ impl Flaws {
     }
 }
 
-/// The steps of a clock: its ticks are off their times, but the times that it tells are right.
+/// The steps of a clock: its ticks deviate from their nominal times, but the reported times are right.
 pub struct Clock<'c> {
     step_s: f64,
     flaws: &'c Flaws,
     ticks: u32,
 }
 
-/// A tick is off by at most this share of a step, so that time rises.
+/// A tick is off by at most this share of a step, so that time always increases.
 const FARTHEST: f64 = 0.45;
 
 impl<'c> Clock<'c> {
@@ -87,7 +87,7 @@ impl<'c> Clock<'c> {
 /// Which rows are lost.
 pub struct Losses<'c> {
     flaws: &'c Flaws,
-    /// Rows of the present loss that are still to come.
+    /// Number of rows still to be lost in the current loss.
     left: usize,
 }
 
@@ -131,7 +131,7 @@ fn normal(deviation: f64, rng: &mut impl Rng) -> f64 {
     normal.sample(rng)
 }
 
-/// The speed of a joint as a rig's controller takes it from the angles: the difference quotient, filtered.
+/// The speed of a joint as a rig's controller derives it from the angles: a filtered difference quotient.
 #[derive(Clone, Default)]
 pub struct Speed {
     previous: Option<f64>,
@@ -139,8 +139,8 @@ pub struct Speed {
 }
 
 impl Speed {
-    /// The speed \[rad/s\] at an angle measured `dt` s after the previous one, behind a first-order filter of time
-    /// constant `filter_s`; zero at the first.
+    /// The speed \[rad/s\] at an angle measured `dt` s after the previous one, through a first-order filter with time
+    /// constant `filter_s`; zero at the first angle.
     pub fn at(&mut self, angle: f64, dt: f64, filter_s: f64) -> f64 {
         let raw = (angle - self.previous.unwrap_or(angle)) / dt;
         self.previous = Some(angle);

@@ -32,14 +32,14 @@ pub struct Summary {
     /// Cells on which closing the loop failed, each with its error.
     pub errors: Vec<(String, String)>,
     pub rows: Vec<Row>,
-    /// Error after over error of the true structure, 0.5 s ahead: median, 90 % quantile and largest over the
-    /// cells with an effect of the library.
+    /// Error after closing the loop, divided by the true structure's, 0.5 s ahead: median, 90 % quantile and largest
+    /// over the cells with library effects.
     pub held_out_ratio: Option<[f64; 3]>,
     /// Number of cells whose true structure the library cannot express.
     pub not_told: usize,
-    /// Passed, by the name of each effect that was hidden.
+    /// Cells passed, by the name of each hidden effect.
     pub by_effect: Vec<Row>,
-    /// Passed, by plant and condition.
+    /// Cells passed, by plant and condition.
     pub by_condition: Vec<Row>,
     /// Intervals that hold the truth, by parameter.
     pub by_parameter: Vec<Row>,
@@ -47,7 +47,7 @@ pub struct Summary {
     pub seconds: Seconds,
 }
 
-/// A cell that was not passed.
+/// A cell that did not pass.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failure {
     pub cell: String,
@@ -66,7 +66,7 @@ pub struct Seconds {
     pub total: f64,
 }
 
-/// Count.
+/// Count the results.
 pub fn summarise(lines: &[Line]) -> Summary {
     let done: Vec<Done<'_>> = lines.iter().map(Done::of).collect();
     let failed = lines.iter().filter_map(|line| {
@@ -110,7 +110,7 @@ fn by(done: &[Done<'_>], keys: impl Fn(&Done<'_>) -> Vec<String>) -> Vec<Row> {
 fn by_parameter(done: &[Done<'_>]) -> Vec<Row> {
     let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
     for coverage in done.iter().flat_map(Done::coverage) {
-        // One row for a parameter, whatever its joint and log.
+        // One row per parameter, whatever its joint and log.
         let name = coverage.name.split('[').next().unwrap_or_default();
         let name = match name.split_once('@') {
             Some((effect, rest)) => {
@@ -128,7 +128,7 @@ fn counted(groups: BTreeMap<String, Vec<bool>>) -> Vec<Row> {
     groups.into_iter().map(row).collect()
 }
 
-/// `None` for a passed cell, and for one that could not be run, which is listed by its error.
+/// `None` for a cell that passed, and for a cell that could not be run, which is listed by its error.
 fn failure(d: &Done<'_>) -> Option<Failure> {
     let Searched {
         answer,

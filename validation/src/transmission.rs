@@ -1,20 +1,20 @@
 /// The transmission between a motor, which has its own inertia and carries the encoder, and the link: a spring-damper
-/// with play. Stiff with play it is backlash, soft without play joint compliance.
+/// with play. Stiff with play, it is backlash; soft without play, it is joint compliance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transmission {
     /// Free angle between the two contacts \[rad\].
     pub play: f64,
-    /// Of the contacts \[N m/rad\].
+    /// Stiffness of the contacts \[N m/rad\].
     pub stiffness: f64,
-    /// Of the contacts \[N m s/rad\].
+    /// Damping of the contacts \[N m s/rad\].
     pub damping: f64,
-    /// Of the motor, seen at the joint \[kg m^2\].
+    /// Inertia of the motor, reflected to the joint \[kg m^2\].
     pub inertia: f64,
 }
 
 /// Contact stiffness of a gear: half a milliradian under 1 N m.
 const CONTACT_STIFFNESS: f64 = 2000.0;
-/// Share of the critical damping of motor and contact.
+/// Damping ratio of motor and contact, as a share of critical damping.
 const DAMPING_RATIO: f64 = 0.3;
 /// Reflected rotor inertia of a small geared motor.
 const ROTOR_INERTIA: f64 = 0.002;

@@ -4,13 +4,13 @@ use super::drive::Approach;
 use super::machine::Machine;
 use super::mechanics::Pair;
 
-/// Instants nearer than this are one instant \[s\]: they differ by rounding.
+/// Instants closer than this \[s\] are the same instant: they differ by rounding.
 const INSTANT_S: f64 = 1e-12;
 
-/// Commands of a rig and the part of them that has reached its drives.
+/// Commands of a rig, and those that have reached its drives.
 #[derive(Default)]
 pub struct Wires {
-    /// Each with the time at which it was issued \[s\], in order.
+    /// Each command with the time at which it was issued \[s\], in order.
     issued: Vec<(f64, Pair)>,
     given: [Approach; 2],
 }
@@ -28,7 +28,7 @@ impl Wires {
         count.checked_sub(1).map_or(0.0, |k| self.issued[k].1[j])
     }
 
-    /// `from`, `to`, and the instants between them at which a command arrives at a drive \[s\].
+    /// `from`, `to`, and the instants between them when a command arrives at a drive \[s\].
     pub fn cuts(&self, machine: &Machine, from: f64, to: f64) -> Vec<f64> {
         let mut cuts = vec![from, to];
         for drive in &machine.drives[..machine.joints()] {
@@ -42,7 +42,7 @@ impl Wires {
         cuts
     }
 
-    /// What each joint's drive is given from `time` s on, until the next command arrives.
+    /// The input to each joint's drive from `time` s on, until the next command arrives.
     pub fn given(&mut self, machine: &Machine, time: f64) -> [Approach; 2] {
         for j in 0..machine.joints() {
             let drive = &machine.drives[j];

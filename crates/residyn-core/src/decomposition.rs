@@ -5,10 +5,10 @@ use nalgebra::{
     DMatrix, DVector, DefaultAllocator, Dim, DimDiff, DimSub, OMatrix, SVD, SymmetricEigen, U1,
 };
 
-/// Sweeps per row or column after which a decomposition has failed; two or three are the rule.
+/// Sweeps per row or column after which a decomposition has failed; two or three are usual.
 const MOST_SWEEPS: usize = 100;
 
-/// The eigenvalues and eigenvectors of a symmetric matrix; `None` where it is not finite.
+/// The eigenvalues and eigenvectors of a symmetric matrix; `None` if it is not finite.
 pub fn eigen<D>(matrix: OMatrix<f64, D, D>) -> Option<SymmetricEigen<f64, D>>
 where
     D: Dim + DimSub<U1>,
@@ -25,8 +25,8 @@ where
     is_finite.then(|| SymmetricEigen::try_new(matrix, f64::EPSILON, most))?
 }
 
-/// The least-squares solution of `columns x = right`, the shortest one without the directions whose singular value is at
-/// most `rounding`; `None` where `columns` is not finite or empty.
+/// The least-squares solution of `columns x = right`, the shortest one, without the directions whose singular value is
+/// at most `rounding`; `None` if `columns` is not finite or empty.
 pub fn least_squares(
     columns: DMatrix<f64>,
     right: &DVector<f64>,

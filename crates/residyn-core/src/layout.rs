@@ -1,9 +1,9 @@
 //! Text in lines for a terminal.
 
-/// Where the text beside a label begins \[characters\].
+/// Where the text next to a label begins \[characters\].
 pub(crate) const LABEL: usize = 9;
 
-/// A label and, beside it, a text in lines of at most `width` characters together, each with a line break.
+/// A label and, next to it, a text in lines of at most `width` characters together, each with a line break.
 pub(crate) fn hanging(label: &str, text: &str, width: usize) -> String {
     let labels = std::iter::once(label).chain(std::iter::repeat(""));
     let lines = labels.zip(wrap(text, width - LABEL));

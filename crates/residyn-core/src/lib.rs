@@ -1,8 +1,8 @@
 //! The core of Residyn: models as programs, their simulation, identification, and the loop from a residual to the physical
 //! effect behind it.
 //!
-//! Arrays and texts go in, values come out: no file is opened here, no clock read, no process started, and random numbers
-//! are an argument. What follows or ends long work is a [`closeloop::Watch`] of the caller.
+//! Arrays and texts go in, values come out: no file is opened here, no clock read, no process started, and random
+//! numbers are an argument. The caller follows or ends long work through a [`closeloop::Watch`].
 //!
 //! Models and effects are made from text, logs from what a program has recorded.
 //!
@@ -65,7 +65,7 @@ pub mod sim;
 pub mod streams;
 pub mod toml_text;
 
-/// Random numbers for whatever takes them as an argument: the same seed gives the same results.
+/// The random number generator that functions take as an argument: the same seed gives the same results.
 pub fn rng(seed: u64) -> rand_chacha::ChaCha8Rng {
     rand::SeedableRng::seed_from_u64(seed)
 }

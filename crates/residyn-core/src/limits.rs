@@ -1,58 +1,58 @@
 //! What is taken at most of what a user gives: depths, sizes and counts. An error about one of them names its number.
 
-/// Parentheses, calls, signs and powers of a formula within each other.
+/// Nested parentheses, calls, signs and powers in a formula.
 pub const FORMULA_NESTING: usize = 200;
-/// Operations of a formula in a row, each on the result of the one before, such as the terms of a sum.
+/// Chained operations in a formula, each on the result of the one before, such as the terms of a sum.
 pub const FORMULA_CHAIN: usize = 1000;
 /// Numbers, names and operations in all formulas of a model.
 pub const MODEL_TERMS: usize = 20_000;
-/// Parameters of a model, its intermediates, or its effects.
+/// Parameters, intermediates or effects of a model.
 pub const MODEL_NAMES: usize = 1000;
 /// Free parameters of a model that closing the loop fits at once: the time of a fit grows with the cube of their number.
 pub const FITTED_PARAMETERS: usize = 500;
 /// Joints of a model: enough for every serial arm, and a limit that catches slips such as `joints = 100`.
 pub const JOINTS: usize = 12;
-/// Elements of a robot description within each other, and joints behind each other.
+/// Nested elements of a robot description, and joints in series.
 pub const XML_DEPTH: usize = 200;
-/// Attributes of an element of a robot description, and names of namespaces of all of it.
+/// Attributes of one element of a robot description, and namespaces in all of it.
 pub const XML_ATTRIBUTES: usize = 200;
-/// Elements of which one has its defaults in a robot description.
+/// Elements in a default class of a robot description.
 pub const XML_DEFAULTS: usize = 200;
 
 /// A text that people write: a model, an effect, a recipe, a robot description \[bytes\].
 pub const TEXT_BYTES: u64 = 4 << 20;
-/// Values, keys, tables and lines of a text in TOML: each takes hundreds of bytes when it is read.
+/// Values, keys, tables and lines of a TOML text: each takes hundreds of bytes when read.
 pub const TOML_PARTS: usize = 150_000;
-/// Arrays and tables of such a text within each other; its parser's own limit.
+/// Nested arrays and tables in such a text; the limit of its parser.
 pub const TOML_NESTING: usize = 80;
 /// A file that the program wrote itself: weights, a description of a model, a report \[bytes\].
 pub const SAVED_BYTES: u64 = 1 << 30;
-/// A message of a recording that is decoded \[bytes\].
+/// A decoded message of a recording \[bytes\].
 pub const MESSAGE_BYTES: usize = 1 << 20;
-/// A message of a recording, or a part of one that is packed as a whole \[bytes\].
+/// A message of a recording, or a part of a recording that is packed as a whole \[bytes\].
 pub const RECORD_BYTES: usize = 1 << 28;
-/// What a packed file may hold, however small it is \[bytes\].
+/// Unpacked size that any packed file may have, however small it is \[bytes\].
 pub const UNPACKED_BYTES: u64 = 16 << 20;
-/// What it may hold beyond that, for each of its own bytes.
+/// Unpacked bytes beyond that, for each byte of the packed file.
 pub const UNPACKED_RATIO: u64 = 20;
 
-/// The largest reading of a log, in its unit: its fourth power is far from the largest number there is.
+/// The largest reading of a log, in its unit: its fourth power is far below the largest representable number.
 pub const READING: f64 = 1e30;
-/// The largest time of a log either way \[s\]: 30 000 years, and a clock in milliseconds that counts from 1970 is beyond it.
+/// The largest absolute time of a log \[s\]: 30 000 years; a clock in milliseconds since 1970 is beyond it.
 pub const LOG_TIME: f64 = 1e12;
-/// Time from the first row of a log to the last, in its median steps: so many,
+/// Time from a log's first row to its last, in median steps: at most this number,
 pub const LOG_STEPS: f64 = 2e7;
-/// or this many times its rows.
+/// or this multiple of its rows, whichever is more.
 pub const PAUSED_STEPS: f64 = 10.0;
 /// Joints of a log that is read without a model.
 pub const LOG_JOINTS: usize = 100;
 /// Columns of a log.
 pub const LOG_COLUMNS: usize = 4096;
-/// Rows of a log that is simulated or, unlike text, may take less than a byte a row.
+/// Rows of a log that is simulated, or in a format that, unlike text, may take less than a byte per row.
 pub const LOG_ROWS: usize = 10_000_000;
-/// Time that a log of a simulated rig, or one of a bench, lasts \[s\].
+/// Duration of a log of a simulated rig, or of a bench \[s\].
 pub const SIMULATED_S: f64 = 1e5;
-/// Steps of all trajectories that are sampled for a training.
+/// Steps of all trajectories sampled for training.
 pub const SAMPLED_STEPS: usize = 10_000_000;
 /// Neurons of a layer.
 pub const LAYER_WIDTH: usize = 4096;
@@ -70,27 +70,27 @@ pub const CANDIDATES: usize = 100_000;
 pub const HORIZON: usize = 2000;
 /// Iterations of a planner.
 pub const ITERATIONS: usize = 10_000;
-/// Epochs of a training.
+/// Training epochs.
 pub const EPOCHS: usize = 100_000_000;
 /// Logs, models, episodes or simulations that one command makes.
 pub const RUNS: usize = 100_000;
 /// Cells of a bench.
 pub const CELLS: usize = 20_000;
 
-/// How many median steps a log of so many rows may last.
+/// How many median steps a log with `rows` rows may last.
 pub fn log_steps(rows: usize) -> f64 {
     LOG_STEPS.max(PAUSED_STEPS * rows as f64)
 }
 
-/// Whether a sensor can read this: false for what is no finite number.
+/// Whether a sensor can read this value: false if it is not finite.
 pub fn is_reading(value: f64) -> bool {
     value.abs() <= READING
 }
 
-/// Refuse numbers, called `name`, of which one is more than a sensor reads.
+/// Refuse numbers, called `name`, if one of them exceeds what a sensor reads.
 ///
 /// # Errors
-/// The number, and what is taken at most.
+/// The number, and the limit.
 pub fn check_readings(name: &str, numbers: impl IntoIterator<Item = f64>) -> Result<(), String> {
     let mut numbers = numbers.into_iter();
     match numbers.find(|number| !is_reading(*number)) {
@@ -101,7 +101,7 @@ pub fn check_readings(name: &str, numbers: impl IntoIterator<Item = f64>) -> Res
     }
 }
 
-/// What is wrong with a file that holds more than that.
+/// The message for a file that holds more than that.
 pub fn too_large() -> String {
     format!(
         "it holds more than {} MB and {UNPACKED_RATIO} times its size when it is unpacked; unpack it first",
@@ -109,7 +109,7 @@ pub fn too_large() -> String {
     )
 }
 
-/// What a file of so many bytes may hold when it is unpacked \[bytes\].
+/// Size that a file of `packed` bytes may have when unpacked \[bytes\].
 pub fn unpacked_bytes(packed: u64) -> u64 {
     UNPACKED_BYTES.saturating_add(UNPACKED_RATIO.saturating_mul(packed))
 }

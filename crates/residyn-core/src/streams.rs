@@ -1,8 +1,8 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// What random numbers of a run are for. Each purpose has a stream of its own, so that more draws for one change no
-/// other, and so has each round of a loop, so that an interrupted run is resumed with the same numbers.
+/// What a run's random numbers are for. Each purpose has its own stream, so that more draws for one purpose do not
+/// change another, and so has each round of a loop, so that an interrupted run resumes with the same numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
     /// Training segments of a recipe's plant.
@@ -33,11 +33,11 @@ pub enum Purpose {
     Other(usize),
 }
 
-/// Which of ChaCha's streams a purpose has. Every result depends on these numbers: they never change.
+/// The ChaCha stream of a purpose. Every result depends on these numbers: they never change.
 enum Source {
     /// A numbered stream of the key that the seed gives.
     OfSeed(u64),
-    /// A key of seed, purpose and round.
+    /// A key made of seed, purpose and round.
     OfKey(u64, usize),
 }
 
@@ -86,7 +86,7 @@ mod tests {
 
     use super::{Purpose, stream};
 
-    /// Worked out by another implementation of ChaCha.
+    /// Computed with another implementation of ChaCha.
     #[test]
     fn streams_never_change() {
         let first = |purpose| stream(7, purpose).next_u64();

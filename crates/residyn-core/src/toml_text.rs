@@ -8,30 +8,30 @@ use toml_parser::lexer::TokenKind;
 
 use crate::limits::{TOML_NESTING, TOML_PARTS};
 
-/// Whether a TOML text has no more parts than are read, and none too deep in others.
+/// Check that a TOML text does not have too many parts, or parts nested too deeply.
 ///
 /// # Errors
-/// Too many or too deep: where \[bytes\], and the limit.
+/// Too many parts, or too deep: the place \[bytes\], and the limit.
 pub fn check_size(text: &str) -> Result<(), (usize, String)> {
-    // What separates parts is counted, wherever it stands.
+    // Separators of parts are counted wherever they occur.
     let parts = text.bytes().filter(|byte| b",=[{.\n".contains(byte));
     if parts.count() > TOML_PARTS {
-        let told = format!(
+        let message = format!(
             "it has more than {TOML_PARTS} values, keys, tables and lines; take out what is not needed"
         );
-        return Err((0, told));
+        return Err((0, message));
     }
-    let told = |at| {
-        let told = format!(
+    let message = |at| {
+        let message = format!(
             "more than {TOML_NESTING} arrays and tables are within each other; take them apart"
         );
-        (at, told)
+        (at, message)
     };
-    too_deep(text).map(told).map_or(Ok(()), Err)
+    too_deep(text).map(message).map_or(Ok(()), Err)
 }
 
-/// Where an array or table begins that is within too many others. The parser counts them, too, but not right where brackets
-/// do not match: there one counts as open until its own end.
+/// The start of the first array or table that is nested too deeply. The parser counts nesting too, but wrongly if
+/// brackets do not match: here a bracket counts as open until its own end.
 fn too_deep(text: &str) -> Option<usize> {
     let mut open = Vec::new();
     for token in Source::new(text).lex() {
@@ -48,26 +48,27 @@ fn too_deep(text: &str) -> Option<usize> {
     None
 }
 
-/// The line of a place \[bytes\], from 1.
+/// The line of a place \[bytes\], counted from 1.
 fn line(text: &str, at: usize) -> usize {
     text[..at].matches('\n').count() + 1
 }
 
-/// What a TOML text says.
+/// The value that a TOML text describes.
 ///
 /// # Errors
-/// A text that is no TOML, has too many parts or does not say a `T`, and a number in it that is not finite.
+/// A text that is not TOML, has too many parts, does not describe a `T`, or contains a number that is not finite.
 pub fn from_toml<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
-    let refused = |at: usize, told: &str| Error::custom(format!("line {}: {told}", line(text, at)));
-    check_size(text).map_err(|(at, told)| refused(at, &told))?;
+    let refused =
+        |at: usize, message: &str| Error::custom(format!("line {}: {message}", line(text, at)));
+    check_size(text).map_err(|(at, message)| refused(at, &message))?;
     let said = toml::from_str(text)?;
     let table = DeTable::parse(text)?;
     match table.get_ref().values().find_map(not_finite) {
         None => Ok(said),
         Some(number) => {
             let span = number.span();
-            let told = format!("{} is no finite number; write one", &text[span.clone()]);
-            Err(refused(span.start, &told))
+            let message = format!("{} is no finite number; write one", &text[span.clone()]);
+            Err(refused(span.start, &message))
         }
     }
 }
@@ -92,10 +93,10 @@ mod tests {
     #[test]
     fn a_text_of_very_many_parts_is_refused() {
         for part in [", 7", "\n", "[[a]]", "a.", "{a = "] {
-            let told = from_toml::<toml::Table>(&part.repeat(150_001)).unwrap_err();
+            let message = from_toml::<toml::Table>(&part.repeat(150_001)).unwrap_err();
             assert!(
-                told.to_string().contains("more than 150000 values"),
-                "{told}"
+                message.to_string().contains("more than 150000 values"),
+                "{message}"
             );
         }
     }
@@ -105,8 +106,11 @@ mod tests {
     fn deep_texts_are_refused_with_their_line() {
         let deep = |part: &str| format!("a = 1\nb = {}", part.repeat(5000));
         for part in ["[", "{[c]\nd={", "{a=[}],b=", "{a={]},b="] {
-            let told = from_toml::<toml::Table>(&deep(part)).unwrap_err();
-            assert!(told.to_string().contains("more than 80 arrays"), "{told}");
+            let message = from_toml::<toml::Table>(&deep(part)).unwrap_err();
+            assert!(
+                message.to_string().contains("more than 80 arrays"),
+                "{message}"
+            );
         }
         let least = format!("b = {}1{}", "[".repeat(80), "]".repeat(80));
         assert!(from_toml::<toml::Table>(&least).is_ok());
@@ -119,10 +123,10 @@ mod tests {
         let read = from_toml::<toml::Table>;
         assert_eq!(read("a = 1_000.5").unwrap()["a"].as_float(), Some(1000.5));
         for number in ["nan", "-inf"] {
-            let told = read(&format!("a = 1\n[b]\nc = [1.0, {{ d = {number} }}]"));
-            let told = told.unwrap_err().to_string();
+            let message = read(&format!("a = 1\n[b]\nc = [1.0, {{ d = {number} }}]"));
+            let message = message.unwrap_err().to_string();
             let expected = format!("line 3: {number} is no finite number; write one");
-            assert_eq!(told.trim(), expected);
+            assert_eq!(message.trim(), expected);
         }
     }
 }

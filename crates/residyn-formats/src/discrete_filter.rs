@@ -10,10 +10,10 @@ use residyn_core::model::CommandFilter;
 /// combination of the lagged torque and of two earlier commands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct DiscreteFilter {
-    /// Saved as the place in a list of torques, from 0: that is how readers of a step use it.
+    /// Saved as the index into a list of torques, from 0, as readers of a step use it.
     #[serde(serialize_with = "as_index")]
     pub joint: Joint,
-    /// How many earlier commands matter; the oldest of them acts first.
+    /// Number of earlier commands that matter; the oldest acts first.
     pub past: usize,
     /// Positions, in `[command of this step, earlier ones, newest first]`, of the command that acts when the step begins
     /// and of the one that replaces it.
@@ -37,7 +37,7 @@ pub(super) struct Combination {
     pub then: f64,
 }
 
-/// A remainder of the delay below this share of a step is rounding.
+/// A fractional step of delay below this value is rounding.
 const ROUNDING: f64 = 1e-9;
 
 impl DiscreteFilter {
@@ -91,7 +91,7 @@ impl DiscreteFilter {
     }
 }
 
-/// Whole steps, and the remaining share of one.
+/// Whole steps, and the remaining fraction of a step.
 fn whole_and_rest(steps: f64) -> (usize, f64) {
     let whole = (steps + ROUNDING).floor();
     let rest = (steps - whole).max(0.0);

@@ -23,33 +23,33 @@ pub struct ExportModel {
     pub equations: Dynamics,
     /// The network that replaces the equations, if any.
     pub prior: Option<MlpWeights>,
-    /// The network for what equations or prior lack, if any.
+    /// The network for dynamics that the equations or the prior lack, if any.
     pub residual: Option<MlpWeights>,
     /// The effects in the equations.
     pub effects: Vec<ExportedEffect>,
     pub integrator: Integrator,
     /// How long a torque is held, in s.
     pub step_s: f64,
-    /// What the machine is to do, for formats that have a reward.
+    /// The machine's task, for formats that have a reward.
     pub task: Option<ExportedTask>,
     /// Configuration and seed of the run that made the model.
     pub origin: serde_json::Value,
 }
 
-/// What an exported machine is to do.
+/// The task of an exported machine.
 #[derive(Debug, Clone)]
 pub struct ExportedTask {
     pub name: String,
     pub about: String,
-    /// The reward of a step: a formula of the state that it leads to, of the torque held over it, and of time.
+    /// The reward of a step: a formula in the state after it, the torque held over it, and time.
     pub objective: String,
-    /// The same as a program of positions, velocities, torques and time, with one output.
+    /// The reward as a program of positions, velocities, torques and time, with one output.
     pub reward: Program,
-    /// Lowest and highest torque of each joint, in N m (or N), or command of its drive.
+    /// Lowest and highest torque of each joint, in N m (or N), or lowest and highest command of its drive.
     pub torque: Vec<[f64; 2]>,
     /// Positions, then velocities at the start.
     pub start: Vec<f64>,
-    /// Half the width of a uniform distribution around each of them.
+    /// Half-width of the uniform distribution around each start value.
     pub start_spread: Vec<f64>,
     /// Steps of an episode.
     pub steps: usize,
@@ -68,8 +68,8 @@ pub struct ExportedEffect {
 }
 
 impl ExportModel {
-    /// The model of `system` with these numbers: values of all parameters, those of effects included, or a network in
-    /// place of the equations; and a residual. `step_s` in s.
+    /// The model of `system` with these numbers: values of all parameters, effects included, or a network in place of
+    /// the equations; and a residual. `step_s` in s.
     pub fn new(
         system: &Model,
         numbers: ModelWeights,
@@ -100,7 +100,7 @@ impl ExportModel {
         }
     }
 
-    /// The same model with something to do.
+    /// The same model with a task.
     #[must_use]
     pub fn with_task(self, task: Option<ExportedTask>) -> Self {
         Self { task, ..self }
@@ -153,7 +153,7 @@ impl ExportModel {
         prior.chain(self.residual.iter().map(|network| ("residual", network)))
     }
 
-    /// The same with the prefix of their tensors' names.
+    /// The networks with the prefix of their tensors' names.
     pub(super) fn prefixed(&self) -> impl Iterator<Item = (&'static str, &MlpWeights)> {
         let prior = self.prior.iter().map(|network| ("prior.", network));
         prior.chain(self.residual.iter().map(|network| ("", network)))
@@ -168,7 +168,7 @@ impl ExportModel {
         }
     }
 
-    /// Units of position and of torque or command of a joint; nothing is known of a command's.
+    /// Units of a joint's position and of its torque or command; a command's unit is unknown.
     pub(super) fn units(&self, joint: Joint) -> [&'static str; 2] {
         let [position, torque] = match self.system.prismatic[joint] {
             true => ["m", "N"],
@@ -180,7 +180,7 @@ impl ExportModel {
         }
     }
 
-    /// What drives the joints, in plural.
+    /// What drives the joints, in the plural.
     pub(super) fn driving(&self) -> &'static str {
         match self.equations.driven_by() {
             Quantity::Command => "commands of the drives",
@@ -199,7 +199,7 @@ impl ExportModel {
         operands.any(|node| Some(node.index()) == time)
     }
 
-    /// Meaning and interval of each parameter, as far as known, for a comment.
+    /// Meaning and interval of each parameter, if known, for a comment.
     pub(super) fn parameter_notes(&self) -> Vec<String> {
         let file: toml::Table = toml::from_str(&self.system.text).expect("a model file is TOML");
         let about = |name: &str| {
@@ -228,7 +228,7 @@ impl ExportModel {
         self.equations.parameters.iter().map(note).collect()
     }
 
-    /// Properties of sensors that no format carries: measured positions that differ from the joint's own.
+    /// Sensor properties that no format carries: measured positions that differ from the joint's.
     pub(super) fn sensors_not_carried(&self) -> Vec<String> {
         let shown = self.equations.reading.as_ref().map(|_| {
             "measured positions: they are the rig's own, without the play of the sensors".to_owned()
@@ -248,7 +248,7 @@ impl ExportModel {
         Some(&self.equations.parameters[filter.parameter])
     }
 
-    /// Its value, in s.
+    /// The time constant of a joint's delay or lag, in s.
     pub(super) fn filter(&self, joint: Joint, kind: CommandFilter) -> Option<f64> {
         self.filter_parameter(joint, kind).map(|p| p.value)
     }
@@ -267,7 +267,7 @@ impl ExportModel {
         )
     }
 
-    /// The program's version, and configuration and seed of the run: for the head of every file.
+    /// The program's version, and the run's configuration and seed, for the head of every file.
     pub(super) fn provenance(&self) -> serde_json::Value {
         json!({
             "residyn": env!("CARGO_PKG_VERSION"),
@@ -295,7 +295,7 @@ impl ExportModel {
     }
 }
 
-/// Keep the file's interval of a value only where the value lies within it.
+/// Keep a value's interval from the file only if the value lies within it.
 fn keep_intervals(equations: &mut Dynamics) {
     for parameter in &mut equations.parameters {
         let value = parameter.value;
@@ -304,7 +304,7 @@ fn keep_intervals(equations: &mut Dynamics) {
     }
 }
 
-/// The effects of a model file; none where a network replaces the equations.
+/// The effects of a model file; none if a network replaces the equations.
 fn exported_effects(system: &Model, equations: &Dynamics) -> Vec<ExportedEffect> {
     let mut first = system.parameters.len();
     if equations.parameters.len() < first {

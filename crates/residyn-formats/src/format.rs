@@ -29,7 +29,7 @@ pub struct Format {
     /// The largest allowed difference between the client's predictions and the program's own, relative to the largest
     /// magnitude of each state.
     pub tolerance: f64,
-    /// Reads robot descriptions, where these are what the format is for.
+    /// Reads robot descriptions, if that is what the format is for.
     pub robots: Option<RobotReader>,
 }
 
@@ -38,22 +38,23 @@ pub struct Format {
 pub struct RobotReader {
     /// What can be read, in a few words.
     pub about: &'static str,
-    /// The chain that ends at a body; without one at the end of the longest branch.
+    /// The chain that ends at the named body, by default at the end of the longest branch.
     pub read: fn(&Path, Option<&str>) -> Result<Chain, FileError>,
     /// The root element of its files.
     pub root: &'static str,
-    /// The effects that its joints hold.
+    /// The effects that its joints can hold.
     pub effects: &'static [&'static str],
-    /// The text of a file with changes of its numbers.
+    /// The text of a file with changed numbers.
     pub rewrite: fn(&Path, &[Change]) -> Result<String, FileError>,
 }
 
 impl RobotReader {
-    /// The model of the chain that ends at the body `tip`, without one at the end of the longest branch, and what of the
-    /// description is read differently or not at all. `drive` is what drives the joints, where that is not torques.
+    /// The model of the chain that ends at the body `tip`, by default at the end of the longest branch, and notes on
+    /// parts of the description that are read differently or not at all. `drive` names what drives the joints, if not
+    /// torques.
     ///
     /// # Errors
-    /// A description that cannot be read, or that is of no serial chain; an unknown drive.
+    /// A description that cannot be read or is not a serial chain; an unknown drive.
     pub fn model(
         &self,
         file: &Path,
@@ -132,7 +133,7 @@ impl Format {
         Ok(files)
     }
 
-    /// Refuse delays of more steps than what is written remembers commands for.
+    /// Refuse delays of more steps than the written files remember commands for.
     fn check_delays(&self, model: &ExportModel) -> Result<(), ExportError> {
         let step_s = model.step_s;
         for joint in Joint::all(model.joints()) {

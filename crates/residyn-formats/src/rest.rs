@@ -9,20 +9,21 @@ use rand::{Rng, RngExt};
 use super::ExportModel;
 use residyn_core::model::{Dynamics, NetworkError};
 
-/// Rate of decay times the length of a step up to which a step decays without overshooting, whatever the scheme.
+/// Largest product of decay rate and step length at which a step decays without overshooting, whatever the scheme.
 const WITHOUT_OVERSHOOT: f64 = 1.0;
-/// Velocities between which the slope of friction at rest is taken \[rad/s or m/s\]: it reverses over far more.
+/// Velocity on either side of rest for the slope of friction \[rad/s or m/s\]: friction reverses over a far wider
+/// range.
 const AROUND_REST: f64 = 1e-7;
-/// Positions that are looked at.
+/// Number of positions examined.
 const POSITIONS: usize = 64;
-/// Of finding eigenvalues: their precision, and the most iterations.
+/// Precision of the eigenvalues, and the most iterations.
 const PRECISION: f64 = 1e-9;
 const ITERATIONS: usize = 1000;
 
 impl ExportModel {
-    /// The equal parts that a step has to be integrated in so that the model comes to rest as its friction stops it: in longer
-    /// ones velocities overshoot, and a model that should rest creeps or chatters. By the fastest rate at which velocities decay at
-    /// rest, in positions drawn from `rng`.
+    /// The number of equal parts in which a step must be integrated so that friction brings the model to rest: in
+    /// longer parts, velocities overshoot, and a model that should rest creeps or chatters. It follows from the fastest
+    /// decay rate of velocities at rest, at positions drawn from `rng`.
     ///
     /// # Errors
     /// A network that does not fit the number of joints.
@@ -40,7 +41,7 @@ impl ExportModel {
     }
 }
 
-/// The fastest rate at which velocities decay \[1/s\] at rest in a position, without torque.
+/// The fastest decay rate of velocities \[1/s\] at rest in a position, without torque.
 fn rate(model: &Dynamics, position: &[f64]) -> f64 {
     let n = model.joints;
     let rates = |joint: usize, velocity: f64| {
@@ -52,7 +53,7 @@ fn rate(model: &Dynamics, position: &[f64]) -> f64 {
     let mut slopes = DMatrix::zeros(n, n);
     for joint in 0..n {
         let [faster, slower] = [AROUND_REST, -AROUND_REST].map(|velocity| rates(joint, velocity));
-        // The last of the rates are those of the velocities.
+        // The last rates are those of the velocities.
         let pairs = faster.iter().zip(&slower).rev().zip((0..n).rev());
         for ((faster, slower), i) in pairs {
             slopes[(i, joint)] = (faster - slower) / (2.0 * AROUND_REST);
@@ -95,7 +96,7 @@ mod tests {
                 .unwrap()
         };
         assert_eq!(substeps(pendulum("")), 1);
-        // It reverses over 0.01 rad/s: 3 * 0.19 / 0.01 = 57/s, of which a step of 10 ms is 0.57.
+        // Friction reverses over 0.01 rad/s: 3 * 0.19 / 0.01 = 57/s, times a step of 10 ms is 0.57.
         assert_eq!(substeps(pendulum(friction)), 1);
         let mut narrow = pendulum(friction);
         narrow.step_s = 0.1;

@@ -2,7 +2,7 @@
 
 use std::fmt::{Display, Write};
 
-/// A template with its places filled by the values of these names. What is filled in is not searched for places.
+/// A template with its places filled by the named values. The filled-in text is not searched for places.
 pub(super) fn filled(template: &str, values: &[(&str, &dyn Display)]) -> String {
     let mut pieces = template.split('@');
     let mut text = pieces.next().unwrap_or_default().to_owned();

@@ -16,7 +16,7 @@ use residyn_io::files::read_text;
 pub(crate) struct Source<'x> {
     path: PathBuf,
     document: Document<'x>,
-    /// By their places, bytes.
+    /// By byte position.
     notes: RefCell<Vec<(usize, String)>>,
 }
 
@@ -47,7 +47,7 @@ impl<'x> Source<'x> {
         self.note_at(node.range().start, message);
     }
 
-    /// The same about what begins at that position, bytes.
+    /// As above, for what begins at this byte position.
     pub fn note_at(&self, at: usize, message: impl fmt::Display) {
         self.notes.borrow_mut().push((at, message.to_string()));
     }
@@ -128,7 +128,7 @@ impl<'x> Source<'x> {
     }
 }
 
-/// Line and column: what is never closed is missed at the end.
+/// Line and column: an unclosed element is reported at the end of the file.
 fn place(error: &Error, text: &str) -> (usize, usize) {
     if matches!(error, Error::UnclosedRootNode) {
         let last = text.lines().last().unwrap_or_default();

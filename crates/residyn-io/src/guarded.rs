@@ -8,7 +8,7 @@ thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `work` returns; `None` where it panics, of which nothing is printed.
+/// The result of `work`; `None` if it panics, without printing anything.
 pub fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
     static SILENT: Once = Once::new();
     SILENT.call_once(be_silent);
@@ -18,12 +18,12 @@ pub fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
     done.ok()
 }
 
-/// From now on, panics that are caught here do not reach the hook of the program.
+/// From now on, panics that are caught here do not reach the program's hook.
 fn be_silent() {
-    let told = take_hook();
+    let message = take_hook();
     set_hook(Box::new(move |panic| {
         if !GUARDED.get() {
-            told(panic);
+            message(panic);
         }
     }));
 }

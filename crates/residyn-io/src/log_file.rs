@@ -9,7 +9,7 @@ use thiserror::Error;
 use crate::files::{OutputError, write_with};
 use crate::table::open;
 
-/// Reads a log of the rig that a model describes from a file, or a folder, of any format that is read.
+/// Reads a log of the rig that a model describes from a file, or a folder, in any supported format.
 ///
 /// # Errors
 /// As [`read_rig_log`].
@@ -46,7 +46,8 @@ pub fn read_rig_log(
     Log::of_table(path, open(path, &columns)?.as_mut(), joints, &columns)
 }
 
-/// Reads a file with the standard columns, of as many joints as its header has, in its order where they have names.
+/// Reads a file with the standard columns, with as many joints as its header has, in the header's order if they have
+/// names.
 ///
 /// # Errors
 /// As [`read_rig_log`].

@@ -6,8 +6,8 @@ use residyn_core::model::{Effect, FileError, Library, Model};
 
 use crate::files::read_text;
 
-/// Reads a model from a file or, where there is no such file, takes the embedded one of that name. Its effects are looked up
-/// in the library.
+/// Reads a model from a file or, if there is no such file, takes the embedded one of that name. Its effects are looked
+/// up in the library.
 ///
 /// # Errors
 /// Unreadable file, unknown or missing key, formula error, unknown effect: with line, column and remedy. For a path that is

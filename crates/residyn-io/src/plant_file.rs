@@ -8,9 +8,9 @@ use residyn_core::plant::{Plant, PlantError};
 use crate::files::{beside_or_named, text_or_embedded};
 use crate::model_file::read_model;
 
-/// Reads a plant file, or takes the embedded plant of that name. A model file, or the name of an embedded system, gives the
-/// rig that the model declares, with the sensors and excitation of a desktop rig. Model files that a plant names are looked
-/// for beside it.
+/// Reads a plant file, or takes the embedded plant of that name. A model file, or the name of an embedded system, gives
+/// the rig that the model declares, with the sensors and excitation of a desktop rig. Model files that a plant names
+/// are looked for next to it.
 ///
 /// # Errors
 /// Unreadable file, unknown key, parameter or effect; messages name place and remedy.
@@ -34,7 +34,7 @@ pub fn plant_from_text(path: &Path, text: &str, library: &Library) -> Result<Pla
     Plant::from_text(path, text, library, model)
 }
 
-/// The error of what is no model, for who may have meant a plant.
+/// The error for a file that is not a model, for users who may have meant a plant.
 fn or_a_plant(mut error: FileError) -> FileError {
     if error.place.is_none() {
         let known = Plant::names().join(", ");

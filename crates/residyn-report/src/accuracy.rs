@@ -7,17 +7,17 @@ use super::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_FRICTION, WITH_NETWORK, ZEROED, amount, listed, small,
     value,
 };
-use residyn_core::closeloop::{Space, TestLog};
+use residyn_core::closeloop::{ErrorModel, TestLog};
 use residyn_core::data::{Joint, Quantity};
 use residyn_core::sim::metric::TorqueError;
 
-/// An error that is so many times its median is that of a few windows.
+/// Above this ratio of an error to its median, a few windows make up most of the error.
 const UNEVEN: f64 = 5.0;
 
-/// More parameters than this that trade with one another are counted.
+/// More parameters than this that trade off against one another are counted, not named.
 const MOST_NAMED: usize = 6;
 
-/// The unit of positions: that of all joints, or both.
+/// The unit of positions: the one that all joints share, or both.
 pub(super) fn position_unit(report: &Report) -> &'static str {
     match report.prismatic.iter().filter(|slides| **slides).count() {
         0 => "rad",
@@ -47,11 +47,11 @@ pub(super) fn scored_torques(errors: &TorqueEntry) -> Vec<(&'static str, &Torque
     models
 }
 
-/// What the models of a table are.
+/// Explains the models in a table.
 pub(super) fn about_models(has_friction: bool) -> String {
     let friction = match has_friction {
         true => {
-            " \"With usual friction\" has Coulomb and viscous friction on every joint as well: what most would try first."
+            " \"With baseline friction\" has Coulomb and viscous friction on every joint as well: what most engineers would try first."
         }
         false => "",
     };
@@ -61,10 +61,10 @@ pub(super) fn about_models(has_friction: bool) -> String {
     )
 }
 
-const ABOUT_ZEROED: &str = " \"Zeroed\" is the model with effects where the zeros of each test log's sensors are estimated on \
-                            its first second, and scored on the rest: what a rig gives that is zeroed before a run.";
+const ABOUT_ZEROED: &str = " \"Zeroed\" is the model with effects, with the zeros of each test log's sensors estimated on \
+                            its first second, and scored on the rest: as on a rig that is zeroed before each run.";
 
-/// That test logs were fitted as well, which the errors on them do not test; `None` where none was.
+/// A warning that test logs were fitted as well, so that the errors on them test nothing; `None` if none was.
 pub(super) fn fitted_tests(report: &Report) -> Option<String> {
     let fitted = &report.error.fitted_logs;
     let (were, their, say) = match fitted.len() {
@@ -81,7 +81,7 @@ pub(super) fn fitted_tests(report: &Report) -> Option<String> {
 /// What was compared, as a sentence.
 pub(super) fn compared(report: &Report) -> String {
     match report.compared {
-        Space::Motion => {
+        ErrorModel::OutputError => {
             let driving = match report.driven_by == Quantity::Command.key() {
                 true => "commands",
                 false => "torques",
@@ -90,18 +90,21 @@ pub(super) fn compared(report: &Report) -> String {
                 "Models are fitted to, selected and compared by the open-loop motion under the logged {driving}."
             )
         }
-        Space::Torque => {
-            "Models are fitted to, selected and compared by the torques that the logged motion needs: a controller prescribes \
-             this motion, and what half a second of it under the logged torques would add up to says little. Values and names \
-             hold for motions like these; a good fit cannot tell what no log moves, holds or loads."
+        ErrorModel::InverseDynamics => {
+            "Models are fitted to, selected and compared by the torques that the logged motion needs: a controller \
+             prescribes this motion, so half a second of open-loop integration under the logged torques says little. \
+             Values and names hold for motions like these; a good fit says nothing about what no log moves, holds or \
+             loads."
                 .to_owned()
         }
     }
 }
 
-/// Errors of the torques joint by joint, where they were compared.
+/// Torque errors joint by joint, if torques were compared.
 pub(super) fn torques(report: &Report) -> String {
-    let Some(errors) = (report.torque.as_ref()).filter(|_| report.compared == Space::Torque) else {
+    let Some(errors) =
+        (report.torque.as_ref()).filter(|_| report.compared == ErrorModel::InverseDynamics)
+    else {
         return String::new();
     };
     let models = scored_torques(errors);
@@ -144,7 +147,7 @@ pub(super) fn torques(report: &Report) -> String {
     out + &repeated(report) + "\n"
 }
 
-/// What an error on test logs says that have the motion of others once more.
+/// What the error says on test logs that repeat the motion of others.
 pub(super) fn repeated(report: &Report) -> String {
     let of_test = report.audit.iter().skip(report.logs.train.len());
     let repeats: Vec<String> = of_test
@@ -157,23 +160,23 @@ pub(super) fn repeated(report: &Report) -> String {
     let of_bodies = match report.identifiability.bodies.is_empty() {
         true => "",
         false => {
-            " Those are predicted no better than with the declared bodies and fitted friction where they need what these logs do \
-             not tell of the bodies (see below)."
+            " Those are predicted no better than with the declared bodies and fitted friction if they depend on what \
+             these logs leave open about the bodies (see below)."
         }
     };
     format!(
-        "\nThe motion of {} is that of another log once more: the error there says how well torques repeat, and nothing of other \
-         motions.{of_bodies}\n",
+        "\nThe motion of {} repeats that of another log: the error there says how well torques repeat, and nothing \
+         about other motions.{of_bodies}\n",
         listed(&repeats)
     )
 }
 
-/// Whether a reduction is one: without an effect the two models are the same.
+/// Whether there is a reduction at all: without an effect the two models are the same.
 pub(super) fn is_some_reduction(ci95: &[f64; 2]) -> bool {
     *ci95 != [0.0, 0.0]
 }
 
-/// How much of an error of the fitted declared model the effects remove, where an interval is known.
+/// How much of the fitted declared model's error the effects remove, if an interval is known.
 pub(super) fn removed(reduction_ci95: Option<[f64; 2]>, error: &str) -> Option<String> {
     let [low, high] = reduction_ci95.filter(is_some_reduction)?;
     Some(format!(
@@ -183,7 +186,7 @@ pub(super) fn removed(reduction_ci95: Option<[f64; 2]>, error: &str) -> Option<S
     ))
 }
 
-/// The same of the open-loop error.
+/// As above, for the open-loop error.
 pub(super) fn removed_of_motion(error: &ErrorEntry) -> Option<String> {
     let of = format!("error at {} s", error.middle().1);
     removed(error.reduction_ci95, &of)
@@ -200,12 +203,12 @@ pub(super) fn diverged(name: &str, model: &ModelError) -> Option<String> {
 /// What is compared on single test logs.
 pub(super) fn compared_on_logs(report: &Report) -> String {
     match report.compared {
-        Space::Motion => format!(
+        ErrorModel::OutputError => format!(
             "Position errors at {} s on each test log, in {}.",
             report.error.middle().1,
             position_unit(report)
         ),
-        Space::Torque => {
+        ErrorModel::InverseDynamics => {
             "Torque errors on each test log, in N m (N where a joint slides).".to_owned()
         }
     }
@@ -245,25 +248,25 @@ pub(super) fn uneven(report: &Report) -> Option<String> {
         after.position_rmse[h][joint] / after.position_median[h][joint].max(f64::MIN_POSITIVE)
     };
     let uneven = Joint::all(report.joints).filter(|joint| share(*joint) > UNEVEN);
-    let told: Vec<String> = uneven
+    let message: Vec<String> = uneven
         .map(|joint| format!("{:.0} times on joint {}", share(joint), report.label(joint)))
         .collect();
-    (!told.is_empty()).then(|| {
+    (!message.is_empty()).then(|| {
         format!(
             "With effects, the error at {horizon_s} s is many times its median over windows ({}): a few windows make up most of \
              it. The pictures show the worst one.",
-            listed(&told)
+            listed(&message)
         )
     })
 }
 
-/// That zeros of the first second do worse than none, where they do.
-pub(super) fn zeroed_in_vain(error: &ErrorEntry) -> Option<String> {
+/// A warning if zeros estimated on the first second do worse than none.
+pub(super) fn zeroing_that_harms(error: &ErrorEntry) -> Option<String> {
     let sum = |model: &ModelError| model.position_rmse[error.middle().0].iter().sum::<f64>();
     let zeroed = error.zeroed.as_ref()?;
     (sum(zeroed) > sum(&error.after)).then(|| {
-        "Zeroing makes it worse here: the first second of these logs does not tell their zeros from what else is off. Zero the \
-         rig itself, or leave the zeros out."
+        "Zeroing makes the error worse here: the first second of these logs does not separate the zeros from other \
+         errors. Zero the rig itself, or leave the zeros out."
             .to_owned()
     })
 }
@@ -273,7 +276,7 @@ fn not_tested(report: &Report) -> String {
     fitted_tests(report).map_or_else(String::new, |sentence| format!("{sentence}\n\n"))
 }
 
-/// A paragraph, where there is something to say.
+/// A paragraph, if there is something to say.
 fn paragraph(sentence: Option<String>) -> String {
     sentence.map_or_else(String::new, |sentence| format!("\n{sentence}\n"))
 }
@@ -325,12 +328,12 @@ pub(super) fn errors(report: &Report) -> String {
     for (name, model) in &models {
         out += &paragraph(diverged(name, model));
     }
-    if report.compared == Space::Motion {
+    if report.compared == ErrorModel::OutputError {
         out += &of_test_logs(report);
     }
     out += &paragraph(uneven(report));
-    out += &paragraph(zeroed_in_vain(&report.error));
-    if let (Some(torque), Space::Motion) = (&report.torque, report.compared) {
+    out += &paragraph(zeroing_that_harms(&report.error));
+    if let (Some(torque), ErrorModel::OutputError) = (&report.torque, report.compared) {
         let _ = writeln!(
             out,
             "\nThe torques that the logged motion needs, low-passed, differ from the logged ones by {} ({AS_WRITTEN}), \
@@ -381,7 +384,7 @@ pub(super) fn parameters(report: &Report) -> String {
             .collect();
         let _ = writeln!(
             out,
-            "- With the values in its file the model diverges in these logs: the fit began at {}.",
+            "- With the values in its file the model diverges on these logs: the fit began at {}.",
             listed(&all)
         );
     }
@@ -391,7 +394,7 @@ pub(super) fn parameters(report: &Report) -> String {
     out + "\n"
 }
 
-/// What the logs do not tell of a parameter.
+/// What the logs leave open about a parameter.
 fn why_held(verdict: &IdentifiabilityEntry, name: &str) -> String {
     let weight = |direction: &&Vec<(String, f64)>| {
         let own = direction.iter().find(|(other, _)| other == name);
@@ -404,17 +407,17 @@ fn why_held(verdict: &IdentifiabilityEntry, name: &str) -> String {
         .map(|(other, _)| format!("`{other}`"))
         .collect();
     let with = match others.len() {
-        0 => return "the logs do not show it, and it stays at its declared value.".to_owned(),
+        0 => return "the logs do not determine it, so it stays at its declared value.".to_owned(),
         1..=MOST_NAMED => listed(&others),
         _ => format!("{} others", others.len()),
     };
     format!(
-        "it trades with {with}, and the logs tell only their combination. It stays as near to its declared value as they allow; \
-         intervals of the others, and of effects, are relative to it."
+        "it trades off against {with}, and the logs determine only their combination. It stays as close to its \
+         declared value as they allow; intervals of the others, and of effects, are conditional on it."
     )
 }
 
-/// Which numbers of the model file do not hold for these logs.
+/// The values in the model file that do not hold for these logs.
 pub(super) fn contradicted(report: &Report) -> String {
     if report.contradicted.is_empty() {
         return String::new();

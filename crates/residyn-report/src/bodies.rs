@@ -5,23 +5,24 @@ use std::fmt::Write;
 use super::schema::{CombinationEntry, Report};
 use residyn_core::digits::amount_of;
 
-/// The combinations of parameters that torques tell, body by body; empty for a model without free bodies.
+/// The combinations of parameters that torques determine, body by body; empty for a model without free bodies.
 pub(super) fn bodies(report: &Report) -> String {
-    let (told, tellable) = (
+    let (identifiable, identifiable_at_most) = (
         &report.identifiability.bodies,
-        report.identifiability.tellable,
+        report.identifiability.identifiable_at_most,
     );
-    if tellable == 0 {
+    if identifiable_at_most == 0 {
         return String::new();
     }
     let mut out = format!(
-        "## What the logs tell of the bodies\n\nTorques depend on {tellable} sums of the bodies' parameters, of which these logs \
-         tell {}. Where the sums stay as they are, bodies are as near to the declared ones as they can be: another motion may need \
-         what only the declared values tell.{}\n\n| body | sum | declared | fitted |\n|---|---|---|---|\n",
-        told.len(),
-        poor(told.len(), tellable)
+        "## What the logs determine about the bodies\n\nTorques depend on {identifiable_at_most} sums of the bodies' \
+         parameters, of which these logs determine {}. Within these sums, bodies stay as close to the declared ones as \
+         they can: another motion may depend on what only the declared values give.{}\n\n| body | sum | declared | \
+         fitted |\n|---|---|---|---|\n",
+        identifiable.len(),
+        poor(identifiable.len(), identifiable_at_most)
     );
-    for one in told {
+    for one in identifiable {
         let _ = writeln!(
             out,
             "| {} | `{}` | {:.4} | {} |",
@@ -34,16 +35,16 @@ pub(super) fn bodies(report: &Report) -> String {
     out + "\n"
 }
 
-/// Logs excite an arm poorly that tell less than this share of what a motion could.
+/// Logs that determine less than this share of what a motion could determine excite an arm poorly.
 const WELL: f64 = 0.8;
 
-/// What to do where the motion tells little.
+/// What to do about poor excitation.
 #[allow(clippy::cast_precision_loss)] // few sums
-pub(super) fn poor(told: usize, tellable: usize) -> &'static str {
-    match (told as f64) < WELL * tellable as f64 {
+pub(super) fn poor(identifiable: usize, identifiable_at_most: usize) -> &'static str {
+    match (identifiable as f64) < WELL * identifiable_at_most as f64 {
         true => {
             " That is poor excitation: move all joints at once, over more of their range and fast enough that their \
-             inertia shows beside gravity and friction."
+             inertia shows next to gravity and friction."
         }
         false => "",
     }

@@ -14,26 +14,26 @@ pub(super) struct OfLogEntry {
     pub log: String,
     /// free parameters, of the declared equations and of effects
     pub parameters: Vec<ParameterEntry>,
-    /// the error that is compared (open-loop position error at the middle horizon in rad or m, or relative torque error) on each
-    /// training log in their order; null where there is none, empty where the logs are many
+    /// the error that is compared (open-loop position error at the middle horizon in rad or m, or relative torque
+    /// error) on each training log in order; null if there is none, empty if there are many logs
     pub errors: Vec<Option<f64>>,
     /// why it could not be fitted
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
 
-/// where a value of the rig lies from run to run, for domain randomisation
+/// range of a value of the rig from run to run, for domain randomisation
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct RangeEntry {
     pub name: String,
     pub unit: String,
     pub value: f64,
-    /// 95 % of runs: the interval of the fit, widened by the spread between logs beyond their own intervals, within the
-    /// parameter's bounds; an end is null where there is none
+    /// range of 95 % of runs: the interval of the fit, widened by the spread between logs beyond their own intervals,
+    /// within the parameter's bounds; an open end is null
     #[serde(deserialize_with = "ends")]
     #[schemars(with = "Ends")]
     pub range: [f64; 2],
-    /// that spread as a standard deviation; null where fewer than two logs tell
+    /// that spread as a standard deviation; null if fewer than two logs determine the value
     pub between_logs: Option<f64>,
 }
 
@@ -62,17 +62,17 @@ fn of_log(one: &OfLog) -> OfLogEntry {
 /// Standard deviations from the middle of a 95 % interval to its ends.
 const ENDS: f64 = 1.96;
 
-/// Of each free parameter, from the fit to all logs and those to single ones.
+/// The range of each free parameter, from the fit to all logs and the fits to single logs.
 pub(super) fn ranges(outcome: &Outcome, by_log: &[OfLogEntry]) -> Vec<RangeEntry> {
     let parameters = outcome.models.after.model.absorbed().all_parameters();
     let range = |of_all: &Parameter| {
         let [low, high] = of_all.ci95?;
         let alone = by_log.iter().flat_map(|log| &log.parameters);
-        let told: Vec<[f64; 2]> = alone
+        let message: Vec<[f64; 2]> = alone
             .filter(|parameter| parameter.name == of_all.name)
             .filter_map(|parameter| Some([parameter.value, half_width(parameter.ci95?) / ENDS]))
             .collect();
-        let between = between(&told);
+        let between = between(&message);
         let [least, most] = of_all.bounds;
         let half = half_width([low, high]).hypot(ENDS * between.unwrap_or(0.0));
         Some(RangeEntry {
@@ -91,8 +91,8 @@ fn half_width([low, high]: [f64; 2]) -> f64 {
     0.5 * (high - low)
 }
 
-/// Standard deviation between values beyond their own, each a value with its standard deviation (DerSimonian and Laird 1986);
-/// `None` for fewer than two.
+/// Standard deviation between values beyond their own uncertainties, each value given with its standard deviation
+/// (DerSimonian and Laird 1986); `None` for fewer than two.
 #[allow(clippy::cast_precision_loss)] // few logs
 fn between(values: &[[f64; 2]]) -> Option<f64> {
     let weighed = values.iter().map(|[value, own]| (*value, own.powi(-2)));

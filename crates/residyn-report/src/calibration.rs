@@ -17,7 +17,7 @@ pub(super) struct CalibrationEntry {
     /// simulations of the accepted model that were searched like the logs
     #[schemars(range(min = 1))]
     runs: usize,
-    /// those in which an effect was named that is absent
+    /// runs in which an absent effect was named
     alarms: usize,
     /// alarms / runs
     #[schemars(range(min = 0, max = 1))]
@@ -25,9 +25,9 @@ pub(super) struct CalibrationEntry {
     rate_ci95: [f64; 2],
     /// the effects named by false alarm, and in how many runs
     named: Vec<AlarmEntry>,
-    /// runs in which something was left that nothing explains
+    /// runs that left a residual that nothing explains
     unexplained: usize,
-    /// effects were hidden in a simulation at so many times their smallest size
+    /// effects were hidden in a simulation at this multiple of their smallest size
     hidden_at: f64,
     /// for each effect that the accepted model lacks, the smallest size that the search would name in four of five such
     /// logs
@@ -49,7 +49,7 @@ pub(super) struct SmallestEntry {
     pub title: String,
     pub joint: Joint,
     parameter: String,
-    /// null where there is none; reason says why
+    /// null if there is none; reason says why
     value: Option<f64>,
     unit: String,
     reason: Option<String>,
@@ -59,7 +59,7 @@ pub(super) struct SmallestEntry {
     with: Vec<ValueEntry>,
     /// whether it was named when hidden in a simulation at 1.5 times that size; null where that was not tried
     verified: Option<bool>,
-    /// what else was named then
+    /// effects that were named in addition
     named_besides: Vec<EffectEntry>,
 }
 
@@ -114,7 +114,7 @@ fn smallest(limit: &DetectionLimit, top_torque: &[f64]) -> SmallestEntry {
     let parameters = &effect.effect.parameters;
     let (leading, values) = match &limit.smallest {
         Smallest::Detectable { switch, values } => (*switch, values.as_slice()),
-        // The parameter that its size would be told by.
+        // The parameter that would give its size.
         _ => (
             parameters.iter().position(|p| p.is_switch()).unwrap_or(0),
             [].as_slice(),
@@ -166,7 +166,7 @@ fn reason(size: &Smallest) -> Option<&'static str> {
     }
 }
 
-/// What was named beside the hidden effect, or in its place.
+/// Effects named in addition to the hidden one, or in its place.
 fn besides(limit: &DetectionLimit) -> impl Iterator<Item = &Named> {
     let hidden = Named::of(&limit.effect);
     let named = limit.named.iter().flatten();
@@ -214,7 +214,7 @@ pub(super) fn simulations(calibration: &CalibrationEntry) -> String {
     )
 }
 
-/// How often something was named that is absent.
+/// How often an absent effect was named.
 pub(super) fn alarms(calibration: &CalibrationEntry) -> String {
     let [low, high] = calibration.rate_ci95.map(|share| 100.0 * share);
     let mut out = format!(
@@ -230,7 +230,7 @@ pub(super) fn alarms(calibration: &CalibrationEntry) -> String {
     }
     let _ = write!(
         out,
-        "; {} left an unexplained remainder",
+        "; {} left an unexplained residual",
         calibration.unexplained
     );
     out

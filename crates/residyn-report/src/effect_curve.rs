@@ -11,7 +11,7 @@ use residyn_core::data::Joint;
 use residyn_core::expr::Program;
 use residyn_core::model::FittedEffect;
 
-/// force of the added effects of a joint that depend on this variable alone; straight between the points
+/// force of the effects added on a joint that depend on this variable alone; linear between the points
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct EffectCurveEntry {
     /// q, qd, tau or t
@@ -21,24 +21,24 @@ pub(super) struct EffectCurveEntry {
     pub x: Vec<f64>,
     /// their sum, N m or N
     pub force: Vec<f64>,
-    /// ends of the pointwise 95 % band that the intervals of the values leave; empty where a value may be anything
+    /// ends of the pointwise 95 % band that follows from the values' intervals; empty if a value is undetermined
     pub low: Vec<f64>,
     pub high: Vec<f64>,
 }
 
-/// A curve is computed at so many points.
+/// Number of points at which a curve is computed.
 const FINE: usize = 1001;
-/// As far as a curve may be off between the points that are kept, as a share of its largest force.
+/// Largest error of a curve between the points that are kept, as a share of its largest force.
 const OFF: f64 = 3e-3;
 
-/// An added effect, its program over the variable, and the number of its first parameter among all.
+/// An added effect, its program over the variable, and the index of its first parameter among all.
 struct Term<'a> {
     effect: &'a FittedEffect,
     program: Program,
     first: usize,
 }
 
-/// The curves of a joint; `range` is that of each variable in the logs.
+/// The curves of a joint; `range` gives the range of each variable in the logs.
 pub(super) fn effect_curves(
     outcome: &Outcome,
     joint: Joint,
@@ -87,7 +87,8 @@ fn curve(
     let thinned = |line: Option<&Vec<f64>>| -> Vec<f64> {
         let line = line.map_or(&[][..], Vec::as_slice);
         let kept = kept.iter().filter_map(|k| line.get(*k));
-        kept.map(|value| super::shown::rounded(*value)).collect()
+        kept.map(|value| super::plot_data::rounded(*value))
+            .collect()
     };
     EffectCurveEntry {
         variable: variable.to_owned(),
@@ -103,7 +104,7 @@ fn curve(
 fn force(outcome: &Outcome, terms: &[Term<'_>], x: f64) -> [f64; 2] {
     let models = &outcome.models;
     let mut sum = 0.0;
-    // How far the force moves with each free value over half of that one's interval.
+    // How much the force changes over half the interval of each free value.
     let mut moves: Vec<(usize, f64)> = Vec::new();
     for term in terms {
         let values = &term.effect.values;

@@ -26,7 +26,7 @@ pub enum WriteError {
 }
 
 impl WriteError {
-    /// The same of a file that was to be moved to another folder, since its temporary name is gone.
+    /// The error with the path in the folder that the file was to be moved to, since its temporary path is gone.
     fn of(self, staging: &Path, folder: &Path) -> Self {
         match self {
             Self::File(OutputError { path, source }) => Self::File(OutputError {
@@ -49,7 +49,7 @@ pub enum ReadError {
         error: std::io::Error,
     },
     #[error(
-        "{}: {error}; a report of another version of the program is made again by the command in its `configuration`",
+        "{}: {error}; if another version of the program wrote the report, make it again with the command in its `configuration`",
         path.display()
     )]
     Shape {
@@ -57,7 +57,7 @@ pub enum ReadError {
         error: serde_json::Error,
     },
     #[error(
-        "{}: it contradicts itself: {fault}; make the report again by the command in its `configuration`",
+        "{}: it contradicts itself: {fault}; make the report again with the command in its `configuration`",
         path.display()
     )]
     Contradiction { path: PathBuf, fault: String },
@@ -67,7 +67,7 @@ impl Report {
     /// The report of a folder.
     ///
     /// # Errors
-    /// A folder without report.json, or one of another form or that contradicts itself.
+    /// A folder without report.json, or a report.json of another form or one that contradicts itself.
     pub fn read(folder: impl AsRef<Path>) -> Result<Self, ReadError> {
         let path = folder.as_ref().join(REPORT);
         let json = match read_saved(&path) {
@@ -97,11 +97,12 @@ impl Report {
 }
 
 /// Write report.json, report.html, report.md, model.toml, the plots and the checkpoint into `folder`, and return the report.
-/// All is written into a folder beside it first and moved when every file has somewhere to go: a failure leaves `folder`
-/// as it was.
+/// Everything is first written into a folder next to it and moved once every file has a destination: a failure leaves
+/// `folder` as it was.
 ///
 /// # Errors
-/// A folder that cannot be written, a full disk, or a file of the report whose place is taken by what is no regular file.
+/// A folder that cannot be written, a full disk, or a report file whose place is taken by something that is not a
+/// regular file.
 pub fn write(
     folder: impl AsRef<Path>,
     outcome: &Outcome,
@@ -157,7 +158,7 @@ fn json(value: &impl Serialize) -> String {
     serde_json::to_string_pretty(value).expect("a report has only finite numbers and texts") + "\n"
 }
 
-/// Apart from the report, which is the same each time.
+/// Kept apart from the report, which is the same each time.
 const TIMINGS: &str = "timings.json";
 
 /// How long each stage took.

@@ -41,7 +41,7 @@ pub(super) fn label(outcome: &Outcome, joint: Joint) -> String {
     outcome.models.after.model.joint_label(joint)
 }
 
-/// The joint of an effect, or both where it couples two.
+/// The joint of an effect, or both joints if it couples two.
 pub(super) fn place(outcome: &Outcome, effect: &FittedEffect) -> String {
     effect.place(|joint| label(outcome, joint))
 }

@@ -3,19 +3,19 @@
 use super::by_log::{by_log, ranges};
 use super::calibration::CalibrationEntry;
 use super::headline::{headline, place};
+use super::plot_data::PlotData;
 use super::schema::{
     AlternativeEntry, AuditEntry, CombinationEntry, ContenderEntry, ContradictedEntry, EffectEntry,
     EffectName, ErrorEntry, FilesEntry, FitEntry, FitsEntry, IdentifiabilityEntry, LogEntry,
     LogsEntry, ModelError, NormEntry, ParameterEntry, RefittedEntry, Report, TorqueEntry,
     TriedEntry, UnexplainedEntry,
 };
-use super::shown::ShownEntry;
 use residyn_core::closeloop::{
     Alternative, Contradicted, Finding, Outcome, ResidualForce, Round, TorqueErrors, Tried,
 };
 use residyn_core::data::{Audit, Joint, Log};
 use residyn_core::identify::{Combination, Fit, FitError};
-use residyn_core::model::{FittedEffect, Model, Origin, OwnValue, Parameter};
+use residyn_core::model::{FittedEffect, Model, Origin, Parameter, PerLogValue};
 use residyn_core::sim::metric::{Assessment, Summary, summarise};
 
 /// Names of the files in the folder of a report.
@@ -33,7 +33,7 @@ impl Report {
         let model = outcome.models.after.model.absorbed();
         let by_log = by_log(outcome);
         Self {
-            schema: 1,
+            schema: 2,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             seed: origin.seed,
             configuration: origin.config.clone(),
@@ -71,11 +71,11 @@ impl Report {
                 before: ended(&outcome.models.before.fit),
                 after: ended(&outcome.models.after.fit),
             },
-            sign_widths: outcome.models.after.model.sign_widths(),
-            compared: outcome.space,
+            smoothing_velocities: outcome.models.after.model.smoothing_velocities(),
+            compared: outcome.error_model,
             error: errors(outcome),
             torque: outcome.errors.torque.clone().map(TorqueEntry::from),
-            residual_norm: norms(&outcome.remainder.before, &outcome.remainder.after),
+            residual_norm: norms(&outcome.diagnostics.before, &outcome.diagnostics.after),
             logs: logs(outcome),
             audit: outcome
                 .given
@@ -97,7 +97,7 @@ impl Report {
                 .as_ref()
                 .map(|learned| learned.check.clone()),
             calibration: outcome.calibration.as_ref().map(CalibrationEntry::new),
-            shown: ShownEntry::of(outcome),
+            plots: PlotData::of(outcome),
             files: FilesEntry {
                 model: MODEL.to_owned(),
                 report: TEXT.to_owned(),
@@ -142,14 +142,14 @@ fn both(effect: &FittedEffect) -> Option<Vec<Joint>> {
     effect.effect.is_coupling().then(|| effect.joints())
 }
 
-fn row((of, own): &(Parameter, Option<&OwnValue>)) -> ParameterEntry {
+fn row((of, own): &(Parameter, Option<&PerLogValue>)) -> ParameterEntry {
     ParameterEntry {
-        log: own.map(OwnValue::log_name),
+        log: own.map(PerLogValue::log_name),
         ..parameter(of)
     }
 }
 
-/// A parameter is identifiable where the logs give it an interval narrower than its magnitude.
+/// A parameter is identifiable if the logs give it an interval narrower than its magnitude.
 pub(super) fn parameter(parameter: &Parameter) -> ParameterEntry {
     let magnitude = parameter.value.abs().max(parameter.scale);
     let narrow = |[low, high]: [f64; 2]| high - low < 2.0 * magnitude;
@@ -200,12 +200,12 @@ fn shifted(effect: &FittedEffect) -> Option<String> {
 }
 
 fn left(outcome: &Outcome) -> UnexplainedEntry {
-    let remainder = &outcome.remainder;
+    let diagnostics = &outcome.diagnostics;
     UnexplainedEntry {
-        left: remainder.unexplained.clone(),
-        curves: (remainder.after.as_ref())
+        left: diagnostics.unexplained.clone(),
+        curves: (diagnostics.after.as_ref())
             .map_or_else(|_| Vec::new(), |force| force.curves.clone()),
-        proposal: remainder.proposal.clone(),
+        proposal: diagnostics.proposal.clone(),
     }
 }
 
@@ -223,7 +223,7 @@ fn norms(
     }
 }
 
-/// The parameters of the declared equations; `model` has the shifts among them.
+/// The parameters of the declared equations; those of `model` include the shifts.
 fn refitted(outcome: &Outcome, model: &Model) -> Vec<RefittedEntry> {
     let before = &outcome.models.before.model.parameters;
     let declared = &outcome.given.declared;
@@ -260,8 +260,8 @@ fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
         determined: verdict.determined,
         undetermined: verdict.undetermined.clone(),
         held: verdict.hold.iter().map(name).collect(),
-        bodies: bodies.told.iter().map(combination).collect(),
-        tellable: bodies.tellable,
+        bodies: bodies.identifiable.iter().map(combination).collect(),
+        identifiable_at_most: bodies.identifiable_at_most,
     }
 }
 

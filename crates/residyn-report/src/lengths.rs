@@ -3,11 +3,11 @@
 use super::motion::MotionEntry;
 use super::schema::{ErrorEntry, ModelError, Report};
 
-/// How many entries a list has to have, and how many it has.
+/// The number of entries that a list must have, and the number that it has.
 type Length = [usize; 2];
 
 impl Report {
-    /// What is wrong, in a clause; `None` of a report as the program writes it.
+    /// What is wrong, in a clause; `None` for a report as the program writes it.
     pub(super) fn contradiction(&self) -> Option<String> {
         let (joints, horizons) = (self.joints, self.error.horizons_s.len());
         if joints == 0 || horizons == 0 {
@@ -26,15 +26,15 @@ impl Report {
             let models = fitted.into_iter().chain(&torque.with_friction);
             lengths.extend(models.map(|model| [joints, model.rms.len()]));
         }
-        if let Some(motion) = &self.shown.motion {
+        if let Some(motion) = &self.plots.motion {
             lengths.extend(motion.lengths());
         }
         let off = lengths.into_iter().find(|[wanted, found]| wanted != found);
         if let Some([wanted, found]) = off {
-            return Some(format!("a list has {found} entries where {wanted} belong"));
+            return Some(format!("a list has {found} entries instead of {wanted}"));
         }
-        let mut clouds = self.shown.residuals.iter();
-        let strange = clouds.find(|cloud| !cloud.joint.is_of(joints))?;
+        let mut scatters = self.plots.residuals.iter();
+        let strange = scatters.find(|cloud| !cloud.joint.is_of(joints))?;
         Some(format!("it has no joint {}", strange.joint))
     }
 }
@@ -69,7 +69,7 @@ impl ModelError {
 }
 
 impl MotionEntry {
-    /// A line for each frame, of which one stands still.
+    /// A line for each frame; one of the frames is the still.
     fn lengths(&self) -> Vec<Length> {
         let frames = self.time.len();
         let moving = self.pictures.iter().flat_map(|picture| {

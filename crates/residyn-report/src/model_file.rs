@@ -1,7 +1,7 @@
 use residyn_core::closeloop::Outcome;
 
-/// The model that closing the loop ended with, as a model file: the declared equations with fitted values and the effects
-/// that were found, shifts among the declared values.
+/// The model that closing the loop ended with, as a model file: the declared equations with fitted values and the
+/// effects that were found, with shifts included in the declared values.
 pub fn model_file(outcome: &Outcome) -> String {
     format!(
         "# Fitted by residyn {}; the declared equations, then the effects that were found.\n\n{}",

@@ -6,7 +6,7 @@ use super::plot::{
     ShapeSample, Track,
 };
 use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
-use residyn_core::closeloop::{ForceSample, Needed, Outcome, ResidualForce, Space};
+use residyn_core::closeloop::{ErrorModel, ForceSample, Needed, Outcome, ResidualForce};
 use residyn_core::data::{Joint, Log};
 use residyn_core::identify::FitError;
 use residyn_core::sim::metric::{Assessment, NeededTorques, Trace, summarise};
@@ -21,9 +21,9 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
             title: "predictions".into(),
         });
     };
-    match outcome.space {
-        Space::Motion => motion(outcome, log),
-        Space::Torque => torques(outcome, log),
+    match outcome.error_model {
+        ErrorModel::OutputError => motion(outcome, log),
+        ErrorModel::InverseDynamics => torques(outcome, log),
     }
 }
 
@@ -60,7 +60,7 @@ fn motion(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
     super::plot::predictions(&panels, &title)
 }
 
-/// Logged torques and those that the motion needs by the models, both low-passed.
+/// Logged torques and those that the motion needs according to the models, both low-passed.
 fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
     let mut needed: Vec<(Role, &str, &NeededTorques)> = Vec::new();
     if let Some(Needed { before, after }) = outcome.predictions.torques.first() {
@@ -124,7 +124,7 @@ fn predicted(traces: &[Trace], log: &Log, joint: Joint) -> Vec<Vec<(f64, f64)>> 
 
 /// The residual generalised force over angle, speed, torque and time, without and with the effects.
 pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
-    let (fitted, with_effects) = (&outcome.remainder.before, &outcome.remainder.after);
+    let (fitted, with_effects) = (&outcome.diagnostics.before, &outcome.diagnostics.after);
     let panel = |joint: Joint| ShapePanel {
         joint,
         label: label(outcome, joint),
@@ -174,7 +174,7 @@ fn shape(
 }
 
 /// Open-loop errors at each horizon, of the fitted models and of those scored as they are. The declared model
-/// as written is left to the tables: its values may be guesses, beside which no other bar could be read.
+/// as written is left to the tables: its values may be guesses, whose bar would dwarf all others.
 pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
     let joints = outcome.models.after.model.joints;
     let errors = &outcome.errors;

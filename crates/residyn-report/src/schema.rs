@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 
 use super::by_log::{OfLogEntry, RangeEntry};
 use super::calibration::CalibrationEntry;
-use super::shown::ShownEntry;
+use super::plot_data::PlotData;
 use residyn_core::closeloop::{
-    Curve, NetworkCheck, Proposal, Separation, Settings, Space, SplitMethod, TestLog, Unexplained,
-    Verdict,
+    Curve, ErrorModel, NetworkCheck, Proposal, Separation, Settings, SplitMethod, TestLog,
+    Unexplained, Verdict,
 };
 use residyn_core::data::{Finding as AuditFinding, Joint, Severity};
 use residyn_core::model::Call;
@@ -38,9 +38,9 @@ pub struct Report {
     /// version of the program
     pub(super) version: String,
     pub(super) seed: u64,
-    /// the command with its arguments as resolved; of a program that calls the library, what it gives
+    /// the command with its arguments as resolved; for a program that calls the library, what it gives
     pub(super) configuration: Value,
-    /// how the program was called; null of a program that calls the library. All else is the same each time
+    /// how the program was called; null for a program that calls the library. Everything else is the same each time
     pub(super) call: Option<Call>,
     /// every tuning constant of closing the loop
     pub(super) settings: Settings,
@@ -48,11 +48,11 @@ pub struct Report {
     pub(super) system: String,
     #[schemars(range(min = 1))]
     pub(super) joints: usize,
-    /// as the model file or a URDF calls the joints, in their order; q1, q2 .. where they have no names
+    /// names of the joints in the model file or URDF, in order; q1, q2 .. if they have none
     pub(super) joint_names: Vec<String>,
     /// for each joint whether it slides (m, N) rather than turns (rad, N m)
     pub(super) prismatic: Vec<bool>,
-    /// the quantity that logs command the joints by: `tau`, or `cmd` of a drive
+    /// the quantity by which logs command the joints: `tau`, or `cmd` of a drive
     pub(super) driven_by: String,
     pub(super) verdict: Verdict,
     /// the answer in a sentence
@@ -63,52 +63,52 @@ pub struct Report {
     pub(super) effects: Vec<EffectEntry>,
     /// other explanations that these logs do not rule out
     pub(super) alternatives: Vec<AlternativeEntry>,
-    /// effects that lower the error on logs left out of the fit without being established: the model has them, but
-    /// their names are not to be relied on
+    /// effects that lower the error on logs left out of the fit without being established: the model has them, but do
+    /// not rely on their names
     pub(super) supported: Vec<EffectEntry>,
     pub(super) unexplained: UnexplainedEntry,
-    /// the declared equations in LaTeX, one a line; of a chain of bodies, their form
+    /// the declared equations in LaTeX, one per line; for a chain of bodies, their form
     pub(super) equations: Vec<String>,
     /// parameters of the declared equations, as refitted
     pub(super) parameters: Vec<RefittedEntry>,
     /// the model with effects, fitted to each training log alone; empty for a single log and for more than 32
     pub(super) by_log: Vec<OfLogEntry>,
-    /// where the values of this rig lie from run to run; also in ranges.json
+    /// ranges of this rig's values from run to run; also in ranges.json
     pub(super) ranges: Vec<RangeEntry>,
     /// values in the model file that lie outside the 95 % interval of the final fit
     pub(super) contradicted: Vec<ContradictedEntry>,
     pub(super) identifiability: IdentifiabilityEntry,
-    /// how the fits ended that the errors and the verdict rest on
+    /// how the fits ended on which the errors and the verdict rest
     pub(super) fits: FitsEntry,
     /// speeds over which the sign of each joint's velocity is smoothed in fits and predictions, rad/s or m/s
-    pub(super) sign_widths: Vec<f64>,
-    /// which errors fits lower, effects are selected by, and `error_reduction` is of
-    pub(super) compared: Space,
+    pub(super) smoothing_velocities: Vec<f64>,
+    /// the errors that fits minimise, effects are selected by, and `error_reduction` refers to
+    pub(super) compared: ErrorModel,
     pub(super) error: ErrorEntry,
-    /// of the torques that the logged motion needs, low-passed; null for a model that gives accelerations
+    /// error of the torques that the logged motion needs, low-passed; null for a model that gives accelerations
     pub(super) torque: Option<TorqueEntry>,
-    /// residual generalised force, root mean square over stretches of 0.15 s, N m or N
+    /// residual generalised force, root mean square over blocks of 0.15 s, N m or N
     pub(super) residual_norm: NormEntry,
     pub(super) logs: LogsEntry,
     /// what the audit found, log by log
     pub(super) audit: Vec<AuditEntry>,
-    /// sets of effects that were fitted, one list a round of the search
+    /// sets of effects that were fitted, one list per round of the search
     pub(super) tried: Vec<Vec<TriedEntry>>,
     /// number of candidates in each round
     pub(super) candidates: Vec<usize>,
     /// whether the search was stopped because its time was spent
     pub(super) stopped: bool,
-    /// errors by which the residual network is used or not; null where none is trained
+    /// errors that decide whether the residual network is used; null if none is trained
     pub(super) network: Option<NetworkCheck>,
-    /// what the training logs could show, by simulations of the accepted model; null where it was not asked for
+    /// what the training logs could show, by simulations of the accepted model; null if it was not requested
     pub(super) calibration: Option<CalibrationEntry>,
-    pub(super) shown: ShownEntry,
+    pub(super) plots: PlotData,
     /// paths in the folder of this report
     pub(super) files: FilesEntry,
 }
 
 impl Report {
-    /// What makes results wrong unless something is done about it, each with its log.
+    /// Findings that make results wrong unless they are fixed, each with its log.
     pub(super) fn serious(&self) -> impl Iterator<Item = (&str, &AuditFinding)> {
         self.audit
             .iter()
@@ -119,7 +119,7 @@ impl Report {
             .filter(|(_, finding)| finding.severity == Severity::Serious)
     }
 
-    /// A joint for people: its number, with its name where it has one.
+    /// A joint for people: its number, with its name if it has one.
     pub(super) fn label(&self, joint: Joint) -> String {
         let name = Some(self.joint_names[joint.index()].as_str());
         joint.called(name.filter(|name| *name != joint.name("q")))
@@ -130,14 +130,14 @@ impl Report {
 pub(super) struct EffectEntry {
     pub name: String,
     pub joint: Joint,
-    /// both joints, where the effect couples two
+    /// both joints, if the effect couples two
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints: Option<Vec<Joint>>,
     /// the name for people
     pub title: String,
     /// the joint or joints for people, with their names
     pub place: String,
-    /// what is added, with the names of this model's parameters; of a shift, the new value
+    /// what is added, with the names of this model's parameters; for a shift, the new value
     pub expression: String,
     /// the expression in LaTeX; null for a shift
     pub latex: Option<String>,
@@ -147,14 +147,14 @@ pub(super) struct EffectEntry {
     pub parameters: Vec<ParameterEntry>,
     #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
-    /// share of the position error that this effect alone takes away; negative where it adds; null where the refit
-    /// without the effect failed
+    /// share of the position error that this effect alone removes; negative if it adds error; null if the refit without
+    /// the effect failed
     #[schemars(range(max = 1))]
     pub error_reduction: Option<f64>,
     /// why that refit failed
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_reduction_failure: Option<String>,
-    /// of an effect that is only supported: what is missing
+    /// for an effect that is only supported: what evidence is missing
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_established: Option<String>,
 }
@@ -162,11 +162,11 @@ pub(super) struct EffectEntry {
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct ParameterEntry {
     pub name: String,
-    /// of a parameter with one value per log: the log in which this one holds
+    /// for a parameter with one value per log: the log in which this value holds
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
     pub value: f64,
-    /// 95 % interval, lower end first; null for a parameter that was held, and an end is null where the logs tell none
+    /// 95 % interval, lower end first; null for a parameter that was held; an end is null if the logs do not bound it
     #[serde(deserialize_with = "some_ends")]
     #[schemars(with = "Option<Ends>")]
     pub ci95: Option<[f64; 2]>,
@@ -203,12 +203,12 @@ pub(super) struct ContradictedEntry {
 pub(super) struct EffectName {
     pub name: String,
     pub joint: Joint,
-    /// both joints, where the effect couples two
+    /// both joints, if the effect couples two
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints: Option<Vec<Joint>>,
     /// for people, with the joint
     pub label: String,
-    /// of a parameter_shift: the parameter that has another value
+    /// for a parameter_shift: the parameter that has another value
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter: Option<String>,
 }
@@ -221,9 +221,9 @@ pub(super) struct AlternativeEntry {
     pub title: String,
     pub place: String,
     pub reason: String,
-    /// the experiment that would tell, in a sentence
+    /// the experiment that would decide, in a sentence
     pub experiment: String,
-    /// its figures, from simulation; null for alternatives that others come before
+    /// its figures, from simulation; null for lower-ranked alternatives
     pub separation: Option<Separation>,
 }
 
@@ -233,15 +233,15 @@ pub(super) struct UnexplainedEntry {
     pub left: Unexplained,
     /// residual generalised force as a function of each variable alone, with a pointwise 95 % band
     pub curves: Vec<Curve>,
-    /// null where nothing is left or nothing fits it
+    /// null if nothing is left or nothing fits it
     pub proposal: Option<Proposal>,
 }
 
 /// the fit of the declared model, and the final one with the effects
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct FitsEntry {
-    /// values that the fit of the declared parameters began with, as pairs of parameter and value, where the model
-    /// diverges with those in its file; else empty
+    /// values that the fit of the declared parameters began with, as pairs of parameter and value, if the model
+    /// diverges with the values in its file; else empty
     pub moved_to: Vec<(String, f64)>,
     pub before: FitEntry,
     pub after: FitEntry,
@@ -256,8 +256,8 @@ pub(super) struct FitEntry {
     pub steps: usize,
     /// loss after each step, in units of the sensors' noise
     pub trace: Vec<f64>,
-    /// condition number of the normal equations, as they are and in units in which each value alone has the same
-    /// information; null where they are singular
+    /// condition number of the normal equations, as they are and scaled so that each value alone has the same
+    /// information; null if they are singular
     pub condition: [Option<f64>; 2],
 }
 
@@ -272,23 +272,23 @@ pub(super) struct IdentifiabilityEntry {
     pub undetermined: Vec<Vec<(String, f64)>>,
     /// parameters held for that reason
     pub held: Vec<String>,
-    /// what the logs tell of the bodies of a chain, where torques were compared
+    /// what the logs determine about the bodies of a chain, if torques were compared
     pub bodies: Vec<CombinationEntry>,
-    /// how many sums of the bodies' parameters any motion could tell
-    pub tellable: usize,
+    /// number of sums of the bodies' parameters that any motion could determine
+    pub identifiable_at_most: usize,
 }
 
-/// a sum of bodies' parameters that the logs tell
+/// a sum of bodies' parameters that the logs determine
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct CombinationEntry {
     /// number of its first body, 1 next to the base
     pub body: usize,
     /// parameters with their weights
     pub sum: Vec<(String, f64)>,
-    /// at the values in the model file
+    /// its value with the values in the model file
     pub declared: f64,
     pub value: f64,
-    /// 95 % interval, lower end first; an end is null where the logs tell none
+    /// 95 % interval, lower end first; an end is null if the logs do not bound it
     #[serde(deserialize_with = "ends")]
     #[schemars(with = "Ends")]
     pub ci95: [f64; 2],
@@ -300,7 +300,7 @@ pub(super) struct CombinationEntry {
 pub(super) struct TorqueEntry {
     pub as_declared: TorqueError,
     pub before: TorqueError,
-    /// with Coulomb and viscous friction on every joint, fitted; null where the declared model has both
+    /// with Coulomb and viscous friction on every joint, fitted; null if the declared model has both
     pub with_friction: Option<TorqueError>,
     pub after: TorqueError,
     /// 95 % interval of the relative reduction of the error, before to after
@@ -311,35 +311,34 @@ pub(super) struct TorqueEntry {
 pub(super) struct ErrorEntry {
     #[schemars(extend("const" = "test"))]
     pub logs: String,
-    /// test logs that are training logs once more: they were fitted, and their errors test nothing; left out where there are
-    /// none
+    /// test logs that repeat training logs: they were fitted, and their errors test nothing; left out if there are none
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fitted_logs: Vec<String>,
     #[schemars(length(min = 1), extend("items" = json!({"type": "number", "exclusiveMinimum": 0})))]
     pub horizons_s: Vec<f64>,
-    /// horizons that were asked for, but are longer than any stretch of the test logs
+    /// horizons that were requested, but are longer than any segment of the test logs
     pub unscored_s: Vec<f64>,
     /// the declared model with the values in its file, before any fit
     pub declared: ModelError,
-    /// the declared model, its own parameters fitted
+    /// the declared model with its own parameters fitted
     pub before: ModelError,
-    /// the declared model with Coulomb and viscous friction on every joint, fitted: what most would try first; null where it
-    /// has both
+    /// the declared model with Coulomb and viscous friction on every joint, fitted: what most would try first; null if
+    /// the declared model has both
     pub with_friction: Option<ModelError>,
     /// the declared model with the effects added, refitted
     pub after: ModelError,
-    /// the same with the zeros of each test log's sensors estimated on its first second, scored on the rest; null where
+    /// as after, with the zeros of each test log's sensors estimated on its first second, scored on the rest; null if
     /// no zero differs from log to log
     pub zeroed: Option<ModelError>,
-    /// with a network trained on what is left; null where none was trained
+    /// with effects and a network trained on what is left; null if none was trained
     pub hybrid: Option<ModelError>,
-    /// the models given to compare with, as they are
+    /// the models given for comparison, as they are
     pub against: Vec<ContenderEntry>,
-    /// 95 % interval of the relative reduction of the position error, before to after; null where the logs are too few
+    /// 95 % interval of the relative reduction of the position error, before to after; null if there are too few logs
     pub reduction_ci95: Option<[f64; 2]>,
-    /// the errors that are compared, on each test log; empty for a single one
+    /// the errors that are compared, on each test log; empty for a single log
     pub by_log: Vec<TestLog>,
-    /// integrator step of the declared model or of that with effects, the shorter one, s
+    /// the shorter of the integrator steps of the declared model and the model with effects, s
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub integrator_step_s: f64,
 }
@@ -360,22 +359,22 @@ pub(super) struct ContenderEntry {
     pub error: ModelError,
 }
 
-/// open-loop errors; one inner list a horizon, one number a joint
+/// open-loop errors; one inner list per horizon, one number per joint
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct ModelError {
     /// root mean square over all rows of all windows, rad or m
     #[schemars(length(min = 1), inner(length(min = 1), inner(range(min = 0))))]
     pub position_rmse: Vec<Vec<f64>>,
-    /// median over the windows of a window's own root mean square, rad or m
+    /// median over the windows of each window's root mean square, rad or m
     #[schemars(length(min = 1), inner(length(min = 1), inner(range(min = 0))))]
     pub position_median: Vec<Vec<f64>>,
     /// as position_rmse, rad/s or m/s
     #[schemars(length(min = 1), inner(length(min = 1), inner(range(min = 0))))]
     pub velocity_rmse: Vec<Vec<f64>>,
-    /// windows scored, one number a horizon
+    /// windows scored, one number per horizon
     #[schemars(length(min = 1))]
     pub windows: Vec<usize>,
-    /// windows in which the model diverged, one number a horizon; they count
+    /// windows in which the model diverged, one number per horizon; they count in the errors
     #[schemars(length(min = 1))]
     pub diverged: Vec<usize>,
 }
@@ -388,7 +387,7 @@ impl ModelError {
     }
 }
 
-/// null where the fit of the force failed
+/// null if the fit of the force failed
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct NormEntry {
     /// of the declared model, fitted
@@ -417,7 +416,7 @@ pub(super) struct LogEntry {
     pub end_s: f64,
     /// intervals left out, start and end in s
     pub leave_out: Vec<[f64; 2]>,
-    /// angles that jump for a single row, one number a joint: masked in fits, scored in test logs
+    /// angles that jump for a single row, one number per joint: masked in fits, scored in test logs
     pub jumps: Vec<usize>,
     /// rows that the logger dropped: put in or left out in fits; in test logs the torque is held over them
     pub dropped_rows: usize,
@@ -427,7 +426,7 @@ pub(super) struct LogEntry {
 pub(super) struct AuditEntry {
     pub log: String,
     pub findings: Vec<AuditFinding>,
-    /// the log whose motion this one has once more
+    /// the log whose motion this one repeats
     #[serde(skip_serializing_if = "Option::is_none")]
     pub repeats: Option<String>,
 }
@@ -435,7 +434,7 @@ pub(super) struct AuditEntry {
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct TriedEntry {
     pub effects: Vec<EffectName>,
-    /// relative fall of the loss on held-out stretches, from that of the set which the round began with
+    /// relative drop of the loss on held-out blocks, from the set with which the round began
     #[schemars(range(max = 1))]
     pub gain: f64,
     /// whether the next round begins with it

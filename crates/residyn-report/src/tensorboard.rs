@@ -10,7 +10,7 @@ use residyn_io::files::OutputError;
 
 /// What the first event of a file says.
 const FILE_VERSION: &str = "brain.Event:2";
-/// Added to a rotated checksum, so that checksums of data that hold checksums stay good ones.
+/// Added to a rotated checksum, so that checksums of data that hold checksums stay sound.
 const CHECKSUM_MASK: u32 = 0xa282_ead8;
 
 /// The fields in use of TensorFlow's `Event`.
@@ -36,7 +36,7 @@ struct Summary {
 struct Value {
     #[prost(string, tag = "1")]
     tag: String,
-    /// Optional in name only: zero too has to be written.
+    /// Optional in name only: zero has to be written too.
     #[prost(float, optional, tag = "2")]
     simple_value: Option<f32>,
 }
@@ -49,11 +49,11 @@ pub struct EventFile {
 }
 
 impl EventFile {
-    /// A new event file in a folder, which is made where it is missing; one folder is one run. The file is named
+    /// A new event file in a folder, which is created if it is missing; one folder is one run. The file is named
     /// after the wall time at its beginning in s since 1970.
     ///
     /// # Errors
-    /// An unwritable folder, or an event file of the same second in it.
+    /// An unwritable folder, or one that holds an event file of the same second.
     pub fn create(folder: &Path, wall_time_s: f64) -> Result<Self, OutputError> {
         let name = format!("events.out.tfevents.{:010}.residyn", wall_time_s.floor());
         let path = folder.join(name);

@@ -3,10 +3,10 @@ use std::fmt::Write;
 use super::accuracy::{compared, contradicted, errors, parameters, torques};
 use super::bodies::bodies;
 use super::calibration::section;
-use super::remainder::remainder;
+use super::diagnostics::diagnostics;
 use super::schema::{EffectEntry, LogEntry, Report};
 use super::wording::{capitalised, probability, reduction, split, values};
-use residyn_core::closeloop::Space;
+use residyn_core::closeloop::ErrorModel;
 use residyn_core::data::{Finding, Interval, Severity};
 use residyn_core::model::Call;
 
@@ -22,7 +22,7 @@ pub fn text(report: &Report) -> String {
         bodies(report),
         contradicted(report),
         alternatives(report),
-        remainder(report),
+        diagnostics(report),
         tried(report),
         (report.calibration.as_ref()).map_or_else(String::new, section),
         logs(report),
@@ -42,7 +42,7 @@ fn answer(report: &Report) -> String {
     )
 }
 
-/// What makes results wrong unless something is done about it, as a list to stand above them.
+/// Findings that make results wrong unless they are fixed, as a list above the results.
 pub(super) fn serious(report: &Report) -> String {
     let line = |(log, finding): (&str, &Finding)| format!("- **{log}**: {finding}\n");
     let lines: Vec<String> = report.serious().map(line).collect();
@@ -50,7 +50,7 @@ pub(super) fn serious(report: &Report) -> String {
         return String::new();
     }
     format!(
-        "Serious findings about the logs, to be mended first:\n\n{}\n",
+        "Serious findings about the logs, to be fixed first:\n\n{}\n",
         lines.concat()
     )
 }
@@ -75,15 +75,15 @@ fn effects(report: &Report) -> String {
         );
     }
     let error = match report.compared {
-        Space::Motion => "position error on the test logs, at the middle horizon,",
-        Space::Torque => "torque error on the test logs",
+        ErrorModel::OutputError => "position error on the test logs, at the middle horizon,",
+        ErrorModel::InverseDynamics => "torque error on the test logs",
     };
     out + &format!(
         "\nError reduction: by how much the {error} is below that of a refit without this effect.\n\n"
     )
 }
 
-/// Of the error on the test logs.
+/// The share of the error on the test logs that an effect removes.
 pub(super) fn removed(effect: &EffectEntry) -> String {
     match (effect.error_reduction, &effect.error_reduction_failure) {
         (Some(part), _) => reduction(part, "error"),
@@ -102,7 +102,7 @@ fn alternatives(report: &Report) -> String {
     for alternative in &report.alternatives {
         let _ = writeln!(
             out,
-            "- **{}** on joint {}: {}. To tell them apart: {}.",
+            "- **{}** on joint {}: {}. To distinguish them: {}.",
             alternative.title, alternative.place, alternative.reason, alternative.experiment
         );
     }
@@ -114,8 +114,8 @@ fn supported(report: &Report) -> String {
         return String::new();
     }
     let mut out = String::from(
-        "## Supported effects\n\nThese lower the loss on stretches left out of the fit and are in the model, but their \
-         names are not to be relied on.\n\n",
+        "## Supported effects\n\nThese lower the loss on blocks left out of the fit and are in the model, but do not \
+         rely on their names.\n\n",
     );
     for effect in &report.supported {
         let _ = writeln!(
@@ -132,7 +132,7 @@ fn supported(report: &Report) -> String {
 
 fn tried(report: &Report) -> String {
     let mut out = String::from(
-        "## What was tried\n\nGain: relative fall of the loss on stretches held out of the fit.\n\n",
+        "## What was tried\n\nGain: relative drop of the loss on blocks held out of the fit.\n\n",
     );
     let rounds = report.tried.iter().zip(&report.candidates);
     for (number, (round, candidates)) in (1..).zip(rounds) {
@@ -145,7 +145,7 @@ fn tried(report: &Report) -> String {
         }
         let _ = writeln!(
             out,
-            "Round {number} ({candidates} candidates; the sets that promised most were fitted):\n\n| effects | gain | |\n|---|---|---|"
+            "Round {number} ({candidates} candidates; the most promising sets were fitted):\n\n| effects | gain | |\n|---|---|---|"
         );
         for tried in round {
             let effects: Vec<&str> = tried.effects.iter().map(|e| e.label.as_str()).collect();
@@ -200,12 +200,12 @@ fn called(call: &Call) -> String {
         took_s,
         ..
     } = call;
-    format!("Begun on {began} by `{command}`, took {took_s:.1} s. ")
+    format!("Started on {began} by `{command}`, took {took_s:.1} s. ")
 }
 
 fn footer(report: &Report) -> String {
     let widths: Vec<String> = report
-        .sign_widths
+        .smoothing_velocities
         .iter()
         .map(|w| format!("{w:.3}"))
         .collect();

@@ -4,10 +4,10 @@ use super::schema::ParameterEntry;
 use residyn_core::closeloop::SplitMethod;
 use residyn_core::digits::{amount_of, rounded};
 
-/// The models that a report compares, by one name each in tables, plots and on the terminal.
+/// The models that a report compares, with one name each in tables, plots and on the terminal.
 pub(super) const AS_WRITTEN: &str = "declared model as written";
 pub(super) const FITTED: &str = "declared model, fitted";
-pub(super) const WITH_FRICTION: &str = "with usual friction";
+pub(super) const WITH_FRICTION: &str = "with baseline friction";
 pub(super) const WITH_EFFECTS: &str = "with effects";
 pub(super) const ZEROED: &str = "with effects, zeroed";
 pub(super) const WITH_NETWORK: &str = "with effects and network";
@@ -51,7 +51,8 @@ pub(super) fn value(parameter: &ParameterEntry) -> String {
     format!("{} = {}", parameter.name, amount(parameter))
 }
 
-/// `0.1598 N m (0.1593 to 0.1603)`; a value that holds in one log alone names it, and one at a bound of its range says so.
+/// `0.1598 N m (0.1593 to 0.1603)`; a value that holds in one log alone names the log, and a value at a bound of its
+/// range says so.
 pub(super) fn amount(parameter: &ParameterEntry) -> String {
     let mut amount = amount_of(parameter.value, parameter.ci95, &parameter.unit);
     if let Some(log) = &parameter.log {

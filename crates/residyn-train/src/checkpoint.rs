@@ -18,9 +18,9 @@ const MANIFEST: &str = "checkpoint.json";
 const MODEL: &str = "model.toml";
 /// The model to use.
 const WEIGHTS: &str = "weights.safetensors";
-/// The model to continue from, which differs where an earlier one was the best.
+/// The model to continue from, which differs if an earlier one was the best.
 const LAST: &str = "last.safetensors";
-/// What the optimiser remembers.
+/// The optimiser's state.
 const OPTIMIZER: &str = "optimizer.bpk";
 
 /// A checkpoint as read from its directory.
@@ -36,14 +36,14 @@ pub struct Checkpoint {
     dir: PathBuf,
 }
 
-/// Writes a run to `dir`, completely or not at all, in place of any checkpoint that is there.
+/// Writes a run to `dir`, completely or not at all, in place of any existing checkpoint.
 ///
-/// The files are written to a new directory beside `dir`, which then takes its name. The old one is
-/// meanwhile called `.NAME.previous`; should the program die between the two renamings, [`Checkpoint::load`]
-/// finds it there, and [`Checkpoint::find`] puts it back.
+/// The files are written to a new directory next to `dir`, which then takes its name. The old one is called
+/// `.NAME.previous` in the meantime; if the program dies between the two renamings, [`Checkpoint::load`] finds it
+/// there, and [`Checkpoint::find`] puts it back.
 ///
 /// # Errors
-/// A directory that cannot be written, or that holds something else than a checkpoint.
+/// A directory that cannot be written, or that holds something other than a checkpoint.
 pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), CheckpointError> {
     let dir = &end_of_links(dir);
     refuse_other_contents(dir)?;
@@ -67,7 +67,7 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
     let fresh = FreshFolder::beside(dir).map_err(OutputError::of(dir))?;
     for (name, bytes) in files {
         let written = write_whole(&fresh.path().join(name), bytes);
-        // Where it is to be, since the temporary name is gone.
+        // Report the final path, since the temporary name is gone.
         written.map_err(|error| OutputError::of(&dir.join(name))(error.source))?;
     }
     Ok(replace(dir, fresh.path()).map_err(OutputError::of(dir))?)
@@ -101,7 +101,8 @@ fn replace(dir: &Path, fresh: &Path) -> std::io::Result<()> {
     remove_folder(&previous)
 }
 
-/// End a replacement that a killed program began: whatever it came to, one checkpoint is there and has its name.
+/// Finish a replacement that a killed program began: however far it got, one checkpoint is there afterwards under its
+/// name.
 fn settle(dir: &Path) -> std::io::Result<()> {
     let previous = previous(dir);
     if dir.join(MANIFEST).is_file() {
@@ -178,7 +179,7 @@ impl Checkpoint {
         Ok((checkpoint, declared, trained))
     }
 
-    /// The checkpoint in `dir`, which the caller owns, or none where `dir` does not exist or is empty.
+    /// The checkpoint in `dir`, which the caller owns, or none if `dir` does not exist or is empty.
     ///
     /// # Errors
     /// As [`Checkpoint::load`], or a directory that holds something else.
@@ -195,7 +196,7 @@ impl Checkpoint {
         content_id(&weights::to_bytes(&self.manifest.shape, &self.weights))
     }
 
-    /// The trained model, on `device`. `dynamics` is what the checkpoint's model file says.
+    /// The trained model, on `device`. `dynamics` is the content of the checkpoint's model file.
     ///
     /// # Errors
     /// When `dynamics` is another model.
@@ -257,7 +258,7 @@ impl Checkpoint {
         let (joints, given) = (saved.joints.to_string(), dynamics.joints.to_string());
         same("number of joints", joints, given)?;
         if saved.prior.is_some() {
-            // A network needs no equations, so that those of the model file may be any.
+            // A network needs no equations, so the model file may have any.
             return Ok(());
         }
         let known = listed(saved.parameters.iter().map(|p| &p.name));
@@ -285,7 +286,7 @@ fn read(dir: &Path, file: &str) -> Result<Vec<u8>, CheckpointError> {
     }
 }
 
-/// The format is read first: in another one everything else may differ.
+/// The format is read first: in another format everything else may differ.
 fn read_manifest(dir: &Path) -> Result<Manifest, CheckpointError> {
     let damaged = |error: serde_json::Error| corrupt(MANIFEST, error.to_string(), dir);
     let json: serde_json::Value = serde_json::from_slice(&read(dir, MANIFEST)?).map_err(damaged)?;

@@ -1,5 +1,5 @@
 //! The loss as a composition of Burn's operations, one row of the batch in each entry of a tensor: the reference of the
-//! fused loss, and what other devices than the processor run.
+//! fused loss, and the version that runs on devices other than the processor.
 
 use burn::tensor::Tensor;
 

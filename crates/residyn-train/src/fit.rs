@@ -12,9 +12,9 @@ use crate::HybridModel;
 /// result by a bit on the same backend and machine.
 #[derive(Clone)]
 pub struct Training {
-    /// The model as the run began.
+    /// The model at the start of the run.
     model: HybridModel,
-    /// Its numbers by now.
+    /// Its current numbers.
     numbers: Packed,
     pub(super) settings: FitSettings,
     pub(super) optimizer: Optimizer,
@@ -32,9 +32,9 @@ pub struct Progress<'a> {
     pub epoch: usize,
     /// Epochs of the whole run.
     pub epochs: usize,
-    /// What was minimised in this epoch, mean over its batches, before their steps.
+    /// The minimised loss in this epoch: mean over its batches, before their steps.
     pub loss: f64,
-    /// The prediction error in it.
+    /// The prediction error in this epoch.
     pub error: f64,
     /// The run itself, for its history and to save it.
     pub training: &'a Training,
@@ -54,7 +54,7 @@ struct Batches<'a> {
     segments: &'a Segments,
     /// All segments, on a device with gradients.
     training: Batch,
-    /// All segments, on a device without.
+    /// All segments, on a device without gradients.
     evaluation: Batch,
     validation: Option<Batch>,
 }
@@ -97,8 +97,8 @@ impl Training {
         })
     }
 
-    /// Trains until all epochs are done or `observer`, called after each, asks to stop; called again, it
-    /// continues. With `validation` the best model by its error is kept, the one before training included.
+    /// Trains until all epochs are done or `observer`, called after each, asks to stop; called again, it continues.
+    /// With `validation`, the model with the lowest validation error is kept, including the one before training.
     ///
     /// # Errors
     /// Segments that do not fit the model, or a loss that is no longer finite: numbers are never repaired.
@@ -184,10 +184,10 @@ impl Training {
         })
     }
 
-    /// The run after so many epochs, with what its optimiser remembered then.
+    /// The run after this many epochs, with the optimiser's state at that time.
     ///
     /// # Errors
-    /// What is wrong with bytes that are no record of this optimiser.
+    /// What is wrong with bytes that are not a record of this optimiser.
     pub(super) fn resumed_at(self, epoch: usize, optimizer: &[u8]) -> Result<Self, String> {
         let optimizer = self.optimizer.resumed(optimizer, &self.numbers, epoch)?;
         Ok(Self {
@@ -207,7 +207,7 @@ impl Training {
         &self.settings
     }
 
-    /// What was recorded so far, oldest first.
+    /// The records so far, oldest first.
     pub fn history(&self) -> &[Record] {
         &self.history
     }
@@ -235,7 +235,7 @@ impl Training {
         let (model, weights) = (&self.model, self.weights());
         let (loss, parts) = (self.objective).weighted_loss(model, &self.numbers, batch, weights);
         let total = self.total(parts)?;
-        // Nothing is where all learning rates are zero.
+        // It is not tracked if all learning rates are zero.
         if loss.is_tracked() {
             let stepped = (self.optimizer).step(self.numbers.clone(), loss.backward());
             self.numbers = stepped.within_bounds(model);
@@ -289,7 +289,7 @@ impl Training {
         penalty.weights(self.penalty_weight, self.model.structure().has_residual)
     }
 
-    /// What is minimised.
+    /// The minimised loss.
     fn total(&self, loss: [f64; 2]) -> Result<f64, TrainError> {
         let weights = self.weights();
         let total = loss[0] * weights[0] + loss[1] * weights[1];

@@ -5,7 +5,7 @@ use residyn_core::model::ModelWeights;
 /// One entry of a training run's history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// Epochs done when it was taken; 0 is the start.
+    /// Epochs done when the entry was recorded; 0 is the start.
     pub epoch: usize,
     /// The minimised sum of error and penalty.
     pub loss: f64,
@@ -13,8 +13,8 @@ pub struct Record {
     pub error: f64,
     /// Norm of the residual F_r; 0 in a model without one.
     pub residual_norm: f64,
-    /// Mean squared error of the validation segments, if there are any. Infinite where the model
-    /// diverges, which is never kept as the best.
+    /// Mean squared error of the validation segments, if there are any. Infinite if the model diverges; such a model is
+    /// never kept as the best.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
@@ -35,7 +35,7 @@ pub(super) struct Best {
     pub weights: ModelWeights,
 }
 
-/// JSON has no infinity, which is written as null.
+/// JSON has no infinity; it is written as null.
 pub(super) fn infinite_if_null<'de, D: Deserializer<'de>, T: From<f64>>(
     from: D,
 ) -> Result<T, D::Error> {

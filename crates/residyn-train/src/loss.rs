@@ -10,11 +10,11 @@ use super::{Backend, Blocks, Columns, HybridModel, Segments, TrainError, compose
 use residyn_core::model;
 use residyn_core::sim::Integrator;
 
-/// What a model is fitted to: the way its predictions are made, and the units of their errors.
+/// The objective of a fit: how predictions are made, and the units of their errors.
 #[derive(Debug)]
 pub struct Objective {
     integrator: Integrator,
-    /// What an error of 1 is in each state.
+    /// The size of a unit error in each state.
     scale: Vec<f64>,
     /// 1 / scale.
     precision: Arc<[f32]>,
@@ -22,7 +22,7 @@ pub struct Objective {
     workers: Arc<Workers>,
 }
 
-/// What evaluates losses.
+/// The implementation that evaluates losses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Implementation {
     /// One operation for rollout, networks and penalty, on the processor; other devices compose the loss.
@@ -41,10 +41,10 @@ pub enum Batch {
 }
 
 impl Objective {
-    /// Errors in the units of `error_scale`, one for each of `2n` states, or 1 for each.
+    /// Errors in units of `error_scale`, one for each of the `2n` states; 1 for each by default.
     ///
     /// # Errors
-    /// Another count, or a number that is not finite and above zero.
+    /// A wrong count, or a number that is not finite and above zero.
     pub fn new(
         integrator: Integrator,
         error_scale: Option<&[f64]>,
@@ -67,8 +67,8 @@ impl Objective {
         })
     }
 
-    /// The same with losses composed of Burn's operations on every device: the reference of the fused loss, and many
-    /// times slower.
+    /// The same objective with losses composed of Burn's operations on every device: the reference for the fused loss,
+    /// and many times slower.
     #[must_use]
     pub fn composed(self) -> Self {
         Self {
@@ -92,21 +92,21 @@ impl Objective {
         self.batch(segments, &(0..segments.len()).collect::<Vec<_>>(), device)
     }
 
-    /// The threads of its losses.
+    /// The threads that evaluate its losses.
     pub(super) fn workers(&self) -> Arc<Workers> {
         self.workers.clone()
     }
 
-    /// E and ||F_r|| of a model on a batch, a tensor `[2]`: with derivatives where the model is on a device that takes them.
-    /// It is part of Burn's graph like any other tensor, so that terms of one's own can be added to it.
+    /// E and ||F_r|| of a model on a batch, a tensor `[2]`, with derivatives if the model is on a device that takes
+    /// them. It is part of Burn's graph like any other tensor, so custom terms can be added to it.
     ///
     /// E: the mean over all segments and steps of ||(s' - s_hat') / scale||_2^2, where s_hat' is reached from the segment's
     /// first state by the unrolled integrator.
     ///
     /// ||F_r||: the root of the mean over all segments and steps of the squared Euclidean norm of F_r at the step's start; 0
-    /// in a model without a residual. This is the norm of F_r as a function, under the distribution of the data. The mean
-    /// of the norms would treat rows one by one and pull small residuals to zero as hard as large ones, so that an effect
-    /// in few rows would vanish first.
+    /// in a model without a residual. This is the norm of F_r as a function, under the distribution of the data. The
+    /// mean of the norms would penalise rows one by one and pull small residuals to zero as hard as large ones, so that
+    /// an effect in few rows would vanish first.
     pub fn loss(&self, model: &HybridModel, batch: &Batch) -> Tensor<1> {
         match batch {
             Batch::Columns(columns) => composed::loss(model, columns, self.integrator, &self.scale),
@@ -117,7 +117,7 @@ impl Objective {
         }
     }
 
-    /// The sum of the two of a model with other numbers, times these weights, `[1]`; and the two alone.
+    /// The weighted sum of E and ||F_r|| for a model with other numbers, `[1]`; and the two alone.
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
     pub(super) fn weighted_loss(
         &self,
@@ -152,13 +152,13 @@ impl Objective {
         fused::loss(numbers, problem, self.workers.clone(), sums)
     }
 
-    /// The same as numbers, without derivatives.
+    /// E and ||F_r|| as numbers, without derivatives.
     pub fn evaluate(&self, model: &HybridModel, batch: &Batch) -> [f64; 2] {
         numbers(self.loss(&model.valid(), batch))
     }
 }
 
-/// The copy has threads of its own.
+/// The copy has its own threads.
 impl Clone for Objective {
     fn clone(&self) -> Self {
         Self {

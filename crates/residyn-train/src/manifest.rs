@@ -8,7 +8,7 @@ use residyn_io::files::content_id;
 /// The number of the checkpoint format that this program writes and reads.
 pub const FORMAT: u64 = 3;
 
-/// `checkpoint.json`: everything about a checkpoint but its weights.
+/// `checkpoint.json`: everything in a checkpoint except its weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     pub format: u64,
@@ -25,7 +25,7 @@ pub struct Manifest {
     /// alpha or lambda.
     pub penalty_weight: f64,
     pub rng: rand_chacha::ChaCha8Rng,
-    /// A hash of what the optimiser remembers.
+    /// A hash of the optimiser's state.
     pub optimizer: String,
     pub best: Option<SavedBest>,
     pub history: Vec<Record>,

@@ -20,11 +20,11 @@ use super::{FitSettings, HybridModel, TrainError, optimizer_record};
 // short of it.
 const EPSILON: f32 = 1e-8;
 
-/// An optimiser of Burn's, with Burn's defaults but for the epsilon of Adam, 1e-8.
+/// One of Burn's optimisers, with Burn's defaults except for Adam's epsilon, 1e-8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OptimizerKind {
-    /// Adam or, where weights decay, AdamW.
+    /// Adam or, with weight decay, AdamW.
     #[default]
     Adam,
     AdaGrad,
@@ -35,7 +35,7 @@ pub enum OptimizerKind {
     Sgd,
 }
 
-/// How the learning rates fall from one epoch to the next, each a scheduler of Burn's.
+/// How the learning rates fall from one epoch to the next; each is one of Burn's schedulers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Schedule {
@@ -49,7 +49,7 @@ pub enum Schedule {
 }
 
 impl OptimizerKind {
-    /// The optimiser without a decay of weights.
+    /// The optimiser without weight decay.
     fn plain(self) -> ModuleOptimizer {
         match self {
             Self::Adam => adam().into(),
@@ -62,7 +62,7 @@ impl OptimizerKind {
         }
     }
 
-    /// The optimiser, with weights that decay in `group` by this share of the learning rate.
+    /// The optimiser, with weights in `group` that decay by this share of the learning rate.
     fn decaying(self, group: ParamGroup, decay: f32) -> Result<ModuleOptimizer, TrainError> {
         let plain = self.plain();
         Ok(match self {
@@ -96,7 +96,7 @@ fn adam() -> WithoutSubnormals<burn::optim::Adam> {
 }
 
 impl Schedule {
-    /// A scheduler from 1 in the first of so many epochs to `last` in the last.
+    /// A scheduler from 1 in the first epoch to `last` in the last of `epochs`.
     fn scheduler(self, last: f64, epochs: usize) -> ModuleLrScheduler {
         let steps = epochs.saturating_sub(1).max(1);
         let scheduler = match self {
@@ -114,13 +114,13 @@ impl Schedule {
     }
 }
 
-/// An optimiser of the parts of a model, each with a learning rate of its own.
+/// An optimiser for the parts of a model, each with its own learning rate.
 #[derive(Clone)]
 pub(super) struct Optimizer {
     optimizer: ModuleOptimizer,
-    /// The share of the learning rates.
+    /// The factor on the learning rates.
     share: ModuleLrScheduler,
-    /// The learning rate of the prior or of all, and that of the residual with its tensor.
+    /// The learning rate of the prior or of all parts, and the residual's with its tensor.
     prior: f64,
     residual: (ParamGroup, f64),
     /// The rates of the current epoch.
@@ -129,7 +129,7 @@ pub(super) struct Optimizer {
 
 impl Optimizer {
     /// # Errors
-    /// A decay of weights that the optimiser does not have.
+    /// Weight decay that the optimiser does not have.
     pub(super) fn new(
         model: &HybridModel,
         numbers: &Packed,
@@ -169,15 +169,15 @@ impl Optimizer {
         self.optimizer.step(self.rates.clone(), numbers, gradients)
     }
 
-    /// What it remembers of its steps, in the order of a file.
+    /// Its state, as the bytes of a file.
     pub(super) fn to_bytes(&self) -> Vec<u8> {
         optimizer_record::to_bytes(&self.optimizer)
     }
 
-    /// The same after so many epochs of a run with these numbers, with what it remembered then.
+    /// The optimiser after this many epochs of a run with these numbers, with its state at that time.
     ///
     /// # Errors
-    /// What is wrong with bytes that are no such record.
+    /// What is wrong with bytes that are not such a record.
     pub(super) fn resumed(
         mut self,
         bytes: &[u8],

@@ -10,8 +10,8 @@ use burn_pack::{Reader, Writer};
 use super::packed::Packed;
 use residyn_io::guarded::guarded;
 
-/// The bytes of the record. Its tensors come in the order of their names: an optimiser keeps them in one that changes from
-/// run to run, and the same run gives the same file.
+/// The bytes of the record. Its tensors are sorted by name: an optimiser keeps them in an order that changes from run
+/// to run, and the same run must give the same file.
 pub(super) fn to_bytes(optimizer: &ModuleOptimizer) -> Vec<u8> {
     let ordered = || -> Result<Bytes, burn_pack::Error> {
         let bytes = optimizer.into_bytes();
@@ -29,17 +29,17 @@ pub(super) fn to_bytes(optimizer: &ModuleOptimizer) -> Vec<u8> {
     ordered().expect("a record in memory is read back").to_vec()
 }
 
-/// The optimiser with what the record of a run with these numbers remembers.
+/// The optimiser with the state recorded in a run with these numbers.
 ///
 /// # Errors
-/// What is wrong with bytes that are no such record.
+/// What is wrong with bytes that are not such a record.
 pub(super) fn from_bytes(
     optimizer: ModuleOptimizer,
     bytes: &[u8],
     numbers: &Packed,
 ) -> Result<ModuleOptimizer, String> {
     check(bytes, numbers)?;
-    // Burn takes for granted that a record belongs to the optimiser.
+    // Burn assumes that a record belongs to the optimiser.
     let read = || {
         let record = OptimizerRecord::from_bytes(Bytes::from_bytes_vec(bytes.to_vec()));
         record.map(|record| optimizer.load_record(record))
@@ -50,7 +50,7 @@ pub(super) fn from_bytes(
     }
 }
 
-/// That every tensor of a record is as long as what it is remembered of.
+/// Check that every tensor of a record has the shape of the tensor that it belongs to.
 fn check(bytes: &[u8], numbers: &Packed) -> Result<(), String> {
     let mut shapes = Shapes::default();
     numbers.visit(&mut shapes);

@@ -4,13 +4,13 @@ use burn::tensor::Tensor;
 use super::hybrid::{join, within_bounds};
 use super::{FitSettings, HybridModel};
 
-/// The learnable numbers of a model in as few tensors as have learning rates of their own. A step of Adam is thirteen
-/// operations of Burn's for each tensor, and those on the layers of a small network would cost more than its loss.
+/// The learnable numbers of a model in one tensor for each learning rate. A step of Adam takes thirteen Burn operations
+/// per tensor, and running these on every layer of a small network would cost more than its loss.
 #[derive(Module, Debug)]
 pub(super) struct Packed {
-    /// All numbers, or those of the prior, in the order of [`HybridModel::flat`].
+    /// All numbers, or only the prior's, in the order of [`HybridModel::flat`].
     pub first: Param<Tensor<1>>,
-    /// Those of the residual, where it is trained in another way than the prior.
+    /// The residual's numbers, if it is trained differently from the prior.
     pub residual: Option<Param<Tensor<1>>>,
 }
 
@@ -42,12 +42,12 @@ impl Packed {
         like.with_flat(&self.flat())
     }
 
-    /// `like` with these numbers, a model of its own.
+    /// `like` with these numbers, as an independent model.
     pub(super) fn unpacked(&self, like: &HybridModel) -> HybridModel {
         self.viewed(like).map(&mut Leaves)
     }
 
-    /// The same with the physical parameters of `model` brought back within their bounds.
+    /// The same numbers with the physical parameters of `model` clamped to their bounds.
     pub(super) fn within_bounds(self, model: &HybridModel) -> Self {
         Self {
             first: within_bounds(model.structure().parameters(), self.first),
@@ -62,7 +62,7 @@ fn learnable(id: u64, numbers: Tensor<1>, rate: f64) -> Param<Tensor<1>> {
     param.set_require_grad(rate > 0.0)
 }
 
-/// The same entries without what they were computed from.
+/// The same entries, detached from the operations that computed them.
 fn leaf<const D: usize>(tensor: Tensor<D>) -> Tensor<D> {
     Tensor::from_inner(tensor.inner()).require_grad()
 }

@@ -2,8 +2,8 @@ use serde::{Deserialize, Serialize};
 
 use super::TrainError;
 
-/// How the size of the residual F_r is weighed against the prediction error E. Without it F = F_p + F_r is not unique: the
-/// network could replace what the physics can express.
+/// How the size of the residual F_r is weighed against the prediction error E. Without it, F = F_p + F_r is not unique:
+/// the network could replace what the physics can express.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Penalty {
@@ -11,9 +11,9 @@ pub enum Penalty {
     Fixed { alpha: f64 },
     /// Minimise ||F_r|| subject to E = 0 by ascent on the dual variable lambda: minimise
     /// ||F_r|| + lambda E, and after each epoch lambda <- lambda + rate E, where E is the epoch's mean
-    /// error. Algorithm 1 of Yin et al. 2021, "Augmenting physical models with deep networks for complex
-    /// dynamics forecasting", arXiv:2010.04456, with one epoch as its outer iteration. E of the epoch is
-    /// measured while it runs rather than by a second pass after it.
+    /// error. Algorithm 1 of Yin et al. 2021, "Augmenting physical models with deep networks for complex dynamics
+    /// forecasting", arXiv:2010.04456, with one epoch as its outer iteration. The epoch's E is measured while it runs,
+    /// not in a second pass.
     Adaptive { initial: f64, rate: f64 },
 }
 
@@ -32,7 +32,7 @@ impl Penalty {
         }
     }
 
-    /// The same with another alpha or initial lambda.
+    /// The same penalty with another alpha or initial lambda.
     pub(super) fn from(self, weight: f64) -> Self {
         match self {
             Self::Fixed { .. } => Self::Fixed { alpha: weight },
@@ -51,7 +51,7 @@ impl Penalty {
         }
     }
 
-    /// What E and ||F_r|| are multiplied by in the sum that is minimised. Without a residual that is E alone.
+    /// The weights of E and ||F_r|| in the minimised sum. Without a residual, the sum is E alone.
     pub(super) fn weights(self, weight: f64, has_residual: bool) -> [f64; 2] {
         match self {
             _ if !has_residual => [1.0, 0.0],

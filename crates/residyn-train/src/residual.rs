@@ -86,7 +86,7 @@ impl ResidualTrainer {
     }
 }
 
-/// The model with a residual that is silent far from these segments: nothing says that it is right there.
+/// The model with a residual that fades to zero far from these segments, where nothing supports it.
 fn fading(model: &HybridModel, segments: &Segments) -> Result<HybridModel, TrainError> {
     let residual = model.weights().residual.expect("it has been trained");
     let rows: Vec<[Vec<f64>; 3]> = segments.rows().collect();
@@ -116,11 +116,11 @@ fn segments(task: &ResidualTask) -> [Segments; 2] {
     let sets = [&task.training, &task.validation];
     let rows: usize = sets.iter().copied().flatten().map(|s| s.time.len()).sum();
     let stride = (rows / task.settings.segments).max(1);
-    sets.map(|stretches: &Vec<Trajectory>| {
+    sets.map(|blocks: &Vec<Trajectory>| {
         let mut set = Segments::new(joints, steps);
-        for stretch in stretches {
-            // Too short a stretch holds no segment, which is no error here.
-            let _ = set.push_trajectory(&stretch.time, &stretch.states, &stretch.inputs, stride);
+        for block in blocks {
+            // A block that is too short holds no segment, which is not an error here.
+            let _ = set.push_trajectory(&block.time, &block.states, &block.inputs, stride);
         }
         set
     })

@@ -5,7 +5,7 @@ use super::{Blocks, SegmentsError, Structure, TrainError};
 use residyn_core::model::{Angles, InputScaling, LastLayer, MlpSettings, MlpWeights};
 use residyn_io::files::content_id;
 
-/// Pieces of trajectories of k steps each, the training data. k = 1 gives transitions (s, a, s').
+/// Segments of trajectories, k steps each: the training data. k = 1 gives transitions (s, a, s').
 ///
 /// Numbers are f32. Sampling may be irregular, since every step has its own length.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,14 +54,14 @@ impl Segments {
         }
     }
 
-    /// Cuts a trajectory into segments, a new one beginning every `stride` rows.
+    /// Cuts a trajectory into segments; a new one begins every `stride` rows.
     ///
-    /// `time` has one number a row (s), `states` `2n` (positions, velocities), `inputs` `n` (held until
-    /// the next row; the last row's is not used).
+    /// `time` has one number per row (s), `states` `2n` (positions, velocities), `inputs` `n` (held until the next row;
+    /// the last row's is not used).
     ///
     /// # Errors
-    /// Lengths that disagree, numbers that are not finite, time that does not grow, too few rows. The
-    /// segments are then unchanged.
+    /// Lengths that disagree, numbers that are not finite, time that does not increase, too few rows. The segments then
+    /// stay unchanged.
     ///
     /// # Panics
     /// When `stride` is zero.
@@ -189,7 +189,7 @@ impl Segments {
         InputScaling::from_rows(angles.features(self.joints), rows)
     }
 
-    /// A new network for models of this motion, its features scaled to it.
+    /// A new network for models of this motion, with features scaled to it.
     pub fn network(
         &self,
         settings: &MlpSettings,

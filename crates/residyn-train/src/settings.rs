@@ -14,20 +14,20 @@ pub struct FitSettings {
     pub epochs: usize,
     pub optimizer: OptimizerKind,
     pub learning_rates: LearningRates,
-    /// Share of the learning rates that is left in the last epoch. 1 keeps them.
+    /// Share of the learning rates that remains in the last epoch. 1 keeps them constant.
     pub anneal: f64,
-    /// How they fall to that share.
+    /// How the learning rates fall to that share.
     pub schedule: Schedule,
-    /// Decoupled weight decay (Loshchilov and Hutter 2019, arXiv:1711.05101): at each step the weights of the residual or,
-    /// in a model without one, of the network shrink by this share of the learning rate. It keeps a network small where
-    /// there are no data.
+    /// Decoupled weight decay (Loshchilov and Hutter 2019, arXiv:1711.05101): at each step the weights of the residual
+    /// or, in a model without one, of the network shrink by this share of the learning rate. Weight decay keeps a
+    /// network small in regions without data.
     pub weight_decay: f64,
     pub batching: Batching,
     pub penalty: Penalty,
     pub integrator: Integrator,
-    /// What an error of 1 is in each state (positions, then velocities); 1 where not given.
+    /// Size of a unit error in each state (positions, then velocities); 1 if not given.
     pub error_scale: Option<Vec<f64>>,
-    /// Epochs between two entries of the history, at which the validation error is also taken.
+    /// Epochs between two entries of the history, which also record the validation error.
     pub record_every: NonZeroUsize,
 }
 
@@ -37,7 +37,7 @@ pub struct FitSettings {
 pub struct LearningRates {
     /// Of the physical parameters, relative to each parameter's scale.
     pub physics: f64,
-    /// Of a network that is the prior.
+    /// Of a network that serves as the prior.
     pub prior: f64,
     /// Of the residual network.
     pub residual: f64,
@@ -50,7 +50,7 @@ pub enum Batching {
     /// One step on all segments.
     #[default]
     Full,
-    /// A step on each part of a new random order; the last part may be smaller.
+    /// A step on each part of a newly shuffled order; the last part may be smaller.
     Mini { size: NonZeroUsize },
 }
 
@@ -83,7 +83,7 @@ impl Default for LearningRates {
 }
 
 impl LearningRates {
-    /// Of the prior of a model, and of its residual.
+    /// The learning rates of a model's prior and residual.
     pub(super) fn of(&self, model: &HybridModel) -> [f64; 2] {
         let prior = match &model.physics {
             Some(_) => self.physics,

@@ -12,11 +12,11 @@ pub struct Trained {
     pub residual_norm: f64,
     /// Values of the physical parameters, in their order and units.
     pub parameters: Vec<f64>,
-    /// The loss became infinite or no number. All else here is then of the last step before or not finite.
+    /// The loss became infinite or NaN. All other values are then from the step before or not finite.
     pub diverged: bool,
 }
 
-/// A model as JSON has it, where numbers that are not finite are null.
+/// A model as stored in JSON, where numbers that are not finite are null.
 #[derive(Deserialize)]
 struct Stored {
     error: Option<f64>,

@@ -1,10 +1,10 @@
 use burn::optim::{Adam, AdamState, AdamW, AdamWState, AdaptiveMomentumState, Optimizer};
 use burn::tensor::{Device, Tensor};
 
-/// Steps after which subnormal moments are set to zero.
+/// Number of steps after which subnormal moments are set to zero.
 const EVERY: usize = 32;
 
-/// Adam whose moments are no subnormal numbers. Those of a weight whose gradient stays zero, as behind a ReLU that no row
+/// Adam without subnormal moments. The moments of a weight whose gradient stays zero, as behind a ReLU that no row
 /// activates, would decay into the subnormal range, where processors are slow.
 #[derive(Debug, Clone)]
 pub(super) struct WithoutSubnormals<O>(pub O);

@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 use serde_json::json;
 
 use super::shard::{self, Sharding, program_id};
-use super::{Answer, Common, interrupt, progress, told, unless_panic, voice};
+use super::{Answer, Common, interrupt, message, progress, terminal, unless_panic};
 use crate::cli::call::{Begun, files};
 use residyn_core::model::Library;
 use residyn_formats::ClientError;
@@ -41,7 +41,8 @@ pub(super) struct Rigs {
     /// Folder of the results
     #[arg(long, default_value = "bench-rigs", value_name = "DIR")]
     out: PathBuf,
-    /// Only rigs whose name contains one of these; RIG/TEXT: of these only results whose name, LOG/METHOD, contains TEXT
+    /// Only rigs whose name contains one of these; RIG/TEXT: of those rigs, only results whose name, LOG/METHOD,
+    /// contains TEXT
     #[arg(long, num_args = 1.., value_name = "RIG")]
     only: Vec<Selection>,
     #[command(flatten)]
@@ -79,7 +80,7 @@ impl Rigs {
     }
 }
 
-/// "No" where something failed.
+/// "No" if something failed.
 pub(super) fn run(arguments: &Rigs) -> Result<Answer> {
     let begun = Begun::now();
     let library = Library::built_in();
@@ -104,7 +105,7 @@ pub(super) fn run(arguments: &Rigs) -> Result<Answer> {
         let work: Vec<Work<'_>> = part.shard().share(work).collect();
         let (_, not_run) = store.run(&work)?;
         for (method, reason) in not_run {
-            voice::say(format!("note: {} was not run: {reason}", method.name()));
+            terminal::say(format!("note: {} was not run: {reason}", method.name()));
         }
         return shard::finish(part, &arguments.common);
     }
@@ -127,7 +128,7 @@ pub(super) fn run(arguments: &Rigs) -> Result<Answer> {
     };
     page.write(&store.folder)?;
     let json = || Ok::<_, anyhow::Error>(serde_json::to_string_pretty(&summary)? + "\n");
-    voice::print(&if arguments.common.json { json()? } else { text })?;
+    terminal::print(&if arguments.common.json { json()? } else { text })?;
     Ok(if summary.failures.is_empty() {
         Answer::Yes
     } else {
@@ -219,7 +220,7 @@ impl Store<'_> {
         Ok((lines, not_run))
     }
 
-    /// The stored result, or that of doing the work now, or why it cannot be done here.
+    /// The stored result, the result of doing the work now, or why it cannot be done here.
     fn line(&self, work: &Work<'_>, bar: &ProgressBar) -> Result<Result<Line, String>> {
         let Work { rig, fold, method } = *work;
         let folder = [&rig.rig.name, &fold.name].map(|name| name.replace(['/', '\\'], "-"));
@@ -246,7 +247,7 @@ impl Store<'_> {
             method,
             fingerprint,
             seconds: begun.elapsed().as_secs_f64(),
-            found: found.and_then(|found| found.map_err(|error| told(&error))),
+            found: found.and_then(|found| found.map_err(|error| message(&error))),
         };
         folder.write(&file, &line)?;
         Ok(Ok(line))

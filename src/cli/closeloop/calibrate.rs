@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::cli::shard::program_id;
-use crate::cli::{interrupt, progress, voice};
+use crate::cli::{interrupt, progress, terminal};
 use residyn_core::closeloop::{Calibration, Calibrator, Searched, Simulation};
 use residyn_core::model::InputFile;
 use residyn_core::model::{Model, Origin};
@@ -26,14 +26,14 @@ struct Stored {
 /// What decides the results of all simulations: the run, what it read and accepted, and this build of the program.
 pub fn run_id(origin: &Origin, accepted: &Model, inputs: &[InputFile]) -> Result<String> {
     let mut config = origin.config.clone();
-    // More simulations leave those that are there as they are.
+    // Asking for more simulations leaves the stored ones valid.
     config["calibrate"].take();
     let hashes: Vec<&str> = inputs.iter().map(|input| input.sha256.as_str()).collect();
     let all = json!([program_id()?, config, accepted.file_text(), hashes]);
     Ok(content_id(all.to_string().as_bytes()))
 }
 
-/// Search the simulations that are not kept yet. What is kept may be removed once the report has it.
+/// Search the simulations that are not stored yet. The store may be removed once the report has the results.
 pub fn carry_out(
     calibrator: Calibrator<'_>,
     folder: &RunFolder,
@@ -52,7 +52,7 @@ pub fn carry_out(
     let is_known = |simulation: &&Simulation| known.contains_key(&configuration(simulation));
     match all.iter().filter(is_known).count() {
         0 => {}
-        kept => voice::say(format!(
+        kept => terminal::say(format!(
             "note: {} has {kept} of {} simulations",
             folder.path().display(),
             all.len()
@@ -81,6 +81,6 @@ pub fn carry_out(
         bar.inc(1);
     }
     bar.finish_and_clear();
-    voice::took("simulating the accepted model", begun);
+    terminal::took("simulating the accepted model", begun);
     Ok((calibrator.conclude(results), file))
 }

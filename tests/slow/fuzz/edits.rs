@@ -5,10 +5,10 @@ use std::ops::Range;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// No input is longer \[bytes\].
+/// Largest length of an input \[bytes\].
 const MOST: usize = 1 << 20;
 
-/// What stands around things in texts of all formats, and what only looks so.
+/// Delimiters in texts of all formats, and some that only look like delimiters.
 const PAIRS: [(&str, &str); 25] = [
     ("(", ")"),
     ("[", "]"),
@@ -37,7 +37,7 @@ const PAIRS: [(&str, &str); 25] = [
     ("#", "\n"),
 ];
 
-/// What may stand where a number or a name is expected, and elsewhere.
+/// Words that may stand in place of a number or a name, and elsewhere.
 const WORDS: [&str; 46] = [
     "0",
     "-0.0",
@@ -109,14 +109,14 @@ const WHOLE: [u64; 18] = [
     u64::MAX,
 ];
 
-/// What the files of a format are.
+/// How the files of a format are encoded.
 #[derive(Clone, Copy)]
 pub enum Form {
     Text,
     Bytes,
 }
 
-/// One of the seeds after some edits: mostly few, since what remains whole is read further.
+/// One of the seeds after some edits: mostly few, since the unchanged parts are read further.
 pub fn edited(form: Form, seeds: &[Vec<u8>], rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut editor = Editor { seeds, rng };
     let mut input = editor.seed().to_vec();
@@ -207,7 +207,7 @@ impl<'a> Editor<'a> {
         }
     }
 
-    /// A part many times.
+    /// Repeat a part many times.
     fn repeat(&mut self, input: &mut Vec<u8>) {
         let part = self.part(input);
         let copied = input[part.clone()].to_vec();
@@ -215,7 +215,7 @@ impl<'a> Editor<'a> {
         input.splice(part, copied.repeat(times));
     }
 
-    /// Some lines or a part many times, a word of them with a number in each.
+    /// Repeat some lines or a part many times, a word of them with a number in each.
     fn repeat_numbered(&mut self, input: &mut Vec<u8>) {
         let (at, copied) = match self.rng.random() {
             true => (self.around(input, is_of_line).start, self.lines(input)),
@@ -246,7 +246,7 @@ impl<'a> Editor<'a> {
         input.splice(part.start..part.start, open.repeat(times).into_bytes());
     }
 
-    /// How often something of this length is repeated: seldom up to the longest input.
+    /// How often a part of this length is repeated: seldom up to the longest input.
     fn times(&mut self, length: usize) -> usize {
         let most = match self.rng.random_range(0..150) {
             0 => 20,
@@ -272,7 +272,7 @@ impl<'a> Editor<'a> {
         start..input.len().min(start + self.rng.random_range(0..=longest))
     }
 
-    /// The bytes around a place that are of a kind.
+    /// The bytes of one kind around a place.
     fn around(&mut self, input: &[u8], is_of: fn(&u8) -> bool) -> Range<usize> {
         let at = self.place(input);
         let before = input[..at]
@@ -293,7 +293,7 @@ impl<'a> Editor<'a> {
         lines.take(count).flatten().copied().collect()
     }
 
-    /// One of the words, or one of a seed.
+    /// One of the words, or a word of a seed.
     fn word(&mut self) -> Vec<u8> {
         match self.rng.random() {
             true => WORDS[self.rng.random_range(0..WORDS.len())].into(),
@@ -304,7 +304,7 @@ impl<'a> Editor<'a> {
         }
     }
 
-    /// A whole number in one of the widths and orders of bytes, or near to one.
+    /// A whole number in one of the widths and byte orders, or a number close to it.
     fn whole(&mut self) -> Vec<u8> {
         let near = self.rng.random_range(0..3_u64);
         let value = WHOLE[self.rng.random_range(0..WHOLE.len())].wrapping_sub(near);
@@ -325,7 +325,7 @@ fn is_of_line(byte: &u8) -> bool {
     *byte != b'\n'
 }
 
-/// Writes over what begins there, as far as there is something.
+/// Overwrites the bytes that begin there, up to the end of the input.
 fn overwrite(input: &mut [u8], bytes: &[u8]) {
     let length = input.len().min(bytes.len());
     input[..length].copy_from_slice(&bytes[..length]);

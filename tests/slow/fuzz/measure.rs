@@ -5,13 +5,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use cpu_time::ThreadTime;
 
-/// The time that an input may take, of a megabyte or less, and each megabyte of a longer one \[s\].
+/// The time that an input of up to a megabyte may take, and each megabyte of a longer one \[s\].
 const MOST_S: f64 = 1.0;
-/// The memory that an input may take, and more for each of its own bytes \[bytes\].
+/// The memory that an input may take, plus `MOST_RATIO` for each of its bytes \[bytes\].
 const MOST_BYTES: u64 = 64 << 20;
 const MOST_RATIO: u64 = 20;
 
-/// What reading an input took: time of the thread, and the most memory that it held at a time.
+/// The cost of reading an input: time of the thread, and its peak memory.
 #[derive(Clone, Copy, Default)]
 pub struct Cost {
     pub seconds: f64,
@@ -20,7 +20,7 @@ pub struct Cost {
     pub accepted: bool,
 }
 
-/// Reads an input of so many bytes.
+/// Reads an input of `length` bytes.
 ///
 /// # Errors
 /// A panic, or a cost that is too large for the input.

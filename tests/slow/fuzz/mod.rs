@@ -1,7 +1,7 @@
 //! Every reader on damaged and on hostile files: each is read or refused, in little time and memory, without a panic.
 //!
-//! An input is told by its target and its number, which is the seed of its random numbers. `RESIDYN_FUZZ=N` runs the first
-//! N inputs of each target in place of the usual ones, `RESIDYN_FUZZ=A..B` those from A on: see docs/robustness.md.
+//! An input is identified by its target and its number, which seeds its random numbers. `RESIDYN_FUZZ=N` runs the first
+//! N inputs of each target instead of the usual ones, `RESIDYN_FUZZ=A..B` those from A on: see docs/robustness.md.
 
 mod edits;
 mod measure;
@@ -24,19 +24,19 @@ use self::edits::{Form, edited};
 use self::measure::{Cost, cost};
 use self::watch::Watch;
 
-/// A reader, and what it is tried on.
+/// A reader, and the inputs that it is tested on.
 struct Target {
     name: &'static str,
     /// How many inputs are tried unless the environment says otherwise.
     inputs: u64,
     form: Form,
-    /// Files as they should be; none where nothing here can make them.
+    /// Valid files; none if they cannot be made here.
     seeds: fn() -> Vec<Vec<u8>>,
-    /// The file that an input becomes, where that is packed.
+    /// Packs an input into a file, if the format is packed.
     pack: fn(Vec<u8>, &mut ChaCha8Rng) -> Vec<u8>,
-    /// Lays out the folder that inputs are read from, and names the file that they become.
+    /// Lays out the folder that inputs are read from, and names the input's file.
     place: fn(&Path) -> PathBuf,
-    /// Reads the input in that file and makes use of it. Whether it is accepted.
+    /// Reads the input in that file and makes use of it. Returns whether it is accepted.
     read: fn(&Path) -> bool,
 }
 
@@ -80,7 +80,7 @@ impl Target {
         assert!(all.faults.is_empty(), "{}", all.faults.join("\n"));
     }
 
-    /// The input of this number. The first are the seeds themselves.
+    /// The input with this number. The first inputs are the seeds themselves.
     fn input(&self, number: u64, seeds: &[Vec<u8>]) -> Vec<u8> {
         let mut rng = ChaCha8Rng::seed_from_u64(content_hash(self.name.as_bytes()) ^ number);
         let seed = usize::try_from(number).ok().and_then(|k| seeds.get(k));
@@ -89,29 +89,29 @@ impl Target {
         (self.pack)(input, &mut rng)
     }
 
-    /// What is wrong, and where the input is kept.
+    /// A description of the fault, and where the input is kept.
     fn kept(&self, number: u64, fault: &str, input: &[u8]) -> String {
         let folder = std::env::temp_dir().join("residyn-fuzz");
         fs::create_dir_all(&folder).unwrap();
         let file = folder.join(format!("{}-{number}", self.name));
         fs::write(&file, input).unwrap();
-        let told = format!(
+        let message = format!(
             "{} {number} {fault}: {} bytes at {}",
             self.name,
             input.len(),
             file.display()
         );
         if asked().is_some() {
-            tell(&told);
+            tell(&message);
         }
-        told
+        message
     }
 }
 
 /// Faults after which a target is given up.
 const MOST_FAULTS: usize = 50;
 
-/// What all inputs took.
+/// The total cost of all inputs.
 #[derive(Default)]
 struct All {
     worst: Cost,
@@ -128,7 +128,7 @@ impl All {
         self.accepted += u64::from(cost.accepted);
     }
 
-    /// Inputs, those accepted, time of all, worst time and worst memory.
+    /// Inputs, accepted inputs, total time, worst time and worst memory.
     fn row(&self, seconds: f64) -> String {
         let percent = 100.0 * self.accepted as f64 / self.inputs.max(1) as f64;
         let (time, memory) = (
@@ -150,7 +150,7 @@ fn asked() -> Option<Range<u64>> {
     Some(number(from)..number(to))
 }
 
-/// Past the test harness, which keeps what is printed to itself.
+/// Bypasses the test harness, which captures what is printed.
 fn tell(line: &str) {
     let _ = std::io::stderr().write_all(format!("{line}\n").as_bytes());
 }

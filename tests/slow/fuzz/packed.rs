@@ -18,7 +18,7 @@ pub fn as_it_is(input: Vec<u8>, _: &mut ChaCha8Rng) -> Vec<u8> {
     input
 }
 
-/// With gzip, now and then so often that it holds very much.
+/// With gzip, now and then repeated so often that it unpacks to a very large file.
 pub fn gzip(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut packer = GzEncoder::new(Vec::new(), Compression::fast());
     for _ in 0..times(rng) {
@@ -27,7 +27,7 @@ pub fn gzip(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     packer.finish().unwrap()
 }
 
-/// An array of NumPy as the angles, beside a column of time.
+/// A NumPy array as the angles, next to a column of time.
 pub fn npz(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let time = seeds::npy().swap_remove(2);
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
@@ -42,7 +42,7 @@ pub fn npz(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
-/// A MATLAB file, each of its elements packed as far as they can be told apart.
+/// A MATLAB file, each element packed as long as elements can be told apart.
 pub fn mat(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let Some((header, mut rest)) = input.split_at_checked(128) else {
         return input;
@@ -63,7 +63,7 @@ pub fn mat(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     packed
 }
 
-/// The description of tensors before the numbers of a checkpoint.
+/// The description of tensors, before the numbers of a checkpoint.
 pub fn tensors(input: Vec<u8>, _: &mut ChaCha8Rng) -> Vec<u8> {
     let file = fs::read(ours(CHECKPOINT).join("weights.safetensors")).unwrap();
     let numbers = &file[8 + seeds::tensors()[0].len()..];
@@ -75,7 +75,7 @@ pub fn tensors(input: Vec<u8>, _: &mut ChaCha8Rng) -> Vec<u8> {
     .concat()
 }
 
-/// A recording whose chunks have no checksums, so that they are read when they are damaged.
+/// A recording whose chunks have no checksums, so that damaged chunks are read.
 pub fn mcap(mut input: Vec<u8>, _: &mut ChaCha8Rng) -> Vec<u8> {
     const MAGIC: usize = 8;
     const CHUNK: u8 = 6;

@@ -17,7 +17,7 @@ use crate::support::exported_models::{CHECKPOINT, exported};
 use crate::support::log_files::{formats, recordings, trajectory};
 use crate::support::paths::ours;
 
-/// All files in a folder and the folders in it, in the order of their names.
+/// All files in a folder and its subfolders, sorted by name.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).unwrap();
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -63,7 +63,7 @@ pub fn robots(format: &str) -> &'static RobotReader {
     format.robots.as_ref().expect("a format of robots")
 }
 
-/// What stands in quotes in models and effects, and is a formula.
+/// Quoted texts in models and effects that are formulas.
 pub fn formulas() -> Vec<Vec<u8>> {
     let texts = [models(), effects()].concat();
     let quoted = |text: Vec<u8>| {
@@ -77,7 +77,7 @@ pub fn formulas() -> Vec<Vec<u8>> {
     all.into_iter().map(String::into_bytes).collect()
 }
 
-/// Model files, those that are made from robot descriptions among them.
+/// Model files, including those made from robot descriptions.
 pub fn models() -> Vec<Vec<u8>> {
     let folders = [
         "models/acrobot.toml",
@@ -93,7 +93,7 @@ pub fn models() -> Vec<Vec<u8>> {
         let described = files(&ours("tests/fixtures/mechanisms"))
             .into_iter()
             .filter(move |path| ends(extension)(path));
-        // Some are there to be refused.
+        // Some fixtures are meant to be refused.
         described.filter_map(move |path| robots(format).model(&path, None, None).ok())
     });
     let derived = derived.map(|(model, _)| model.text.into_bytes());
@@ -155,7 +155,7 @@ pub fn optimizers() -> Vec<Vec<u8>> {
     named(Some(&ours(CHECKPOINT)), &["optimizer.bpk"])
 }
 
-/// The descriptions of tensors: what stands before the numbers.
+/// The descriptions of tensors, which precede the numbers.
 pub fn tensors() -> Vec<Vec<u8>> {
     let described = |file: Vec<u8>| {
         let (length, rest) = file.split_first_chunk().unwrap();
@@ -192,7 +192,7 @@ pub fn npz() -> Vec<Vec<u8>> {
     )
 }
 
-/// One array of NumPy.
+/// One NumPy array.
 pub fn npy() -> Vec<Vec<u8>> {
     let matrix = |header: &str, numbers: Vec<u8>| {
         let length = (header.len() as u16).to_le_bytes();
@@ -248,7 +248,7 @@ pub fn lerobot() -> Vec<Vec<u8>> {
     named(formats(), &["single/meta/info.json"])
 }
 
-/// The file of the episodes of that data set.
+/// The file of episodes of that data set.
 pub fn episodes() -> PathBuf {
     formats()
         .expect("asked where there are seeds")

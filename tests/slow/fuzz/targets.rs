@@ -32,7 +32,7 @@ use crate::support::catalogue::fitted;
 use crate::support::exported_models::{CHECKPOINT, exported};
 use crate::support::paths::ours;
 
-/// Files shorter than this are put to all uses, also to those that take longer than reading \[bytes\].
+/// Files shorter than this are used in all ways, including those that take longer than reading \[bytes\].
 const SHORT: usize = 8000;
 /// Rows of a log that is audited.
 const FEW_ROWS: usize = 2000;
@@ -42,12 +42,12 @@ fn library() -> &'static Library {
     LIBRARY.get_or_init(Library::built_in)
 }
 
-/// The text of an input, where it is one.
+/// The text of an input, if it is text.
 fn text(path: &Path) -> Option<String> {
     String::from_utf8(fs::read(path).unwrap()).ok()
 }
 
-/// Every equation at one place; whether its values are finite does not matter.
+/// Every equation at one point; its values need not be finite.
 fn evaluate(dynamics: &Dynamics) {
     let program = &dynamics.program;
     program.eval(&vec![0.3; program.inputs().len()]);
@@ -76,7 +76,7 @@ fn use_log(log: &Log, columns: &Columns) {
     }
 }
 
-/// Reads a log with the joints that it names, or with those of the rig that the seeds are of.
+/// Reads a log with the joints that it names, or with those of the rig in the seeds.
 fn log_of(path: &Path, driven_by: Quantity) -> Result<Log, LogError> {
     let columns = Columns {
         joint_names: vec!["elbow".into(), "wrist".into()],
@@ -254,7 +254,7 @@ fn plant() {
             return false;
         };
         evaluate(&plant.dynamics());
-        // Two steps, where they are short.
+        // Two steps, if they are short.
         let length = 2.0 / plant.sensor.rate_hz;
         if length < 0.1
             && let Ok(short) = plant.lasting(length)
@@ -366,7 +366,7 @@ fn weights() {
     .run();
 }
 
-/// What an optimiser remembers, with a hash in the description of the checkpoint that fits.
+/// An optimiser's state, with the checkpoint's description giving its hash.
 #[test]
 fn optimizer() {
     let place = |folder: &Path| in_checkpoint(folder, "optimizer.bpk");

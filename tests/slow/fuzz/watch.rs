@@ -6,14 +6,14 @@ use std::time::{Duration, Instant};
 
 use super::tell;
 
-/// The time after which an input is given up, on a machine with much else to do.
+/// The time after which an input is given up, on a busy machine.
 const MOST: Duration = Duration::from_secs(60);
 
-/// The input that a target reads, since when.
+/// The input that a target is reading, and since when.
 pub struct Watch(Arc<Mutex<(u64, Instant)>>);
 
 impl Watch {
-    /// Ends the process where the target reads one input for too long.
+    /// Ends the process if the target reads one input for too long.
     pub fn of(target: &'static str) -> Self {
         let input = Arc::new(Mutex::new((0, Instant::now())));
         let watched = Arc::downgrade(&input);

@@ -12,9 +12,9 @@ use crate::support::paths::config;
 pub struct Long {
     pub name: &'static str,
     pub arguments: Vec<String>,
-    /// Makes what it reads.
+    /// Makes the command's input.
     pub prepare: fn(&Path),
-    /// What it says when it goes on from what is there; nothing where it says nothing, or nothing is there.
+    /// The message with which it continues from existing files; `None` if it says nothing or no files exist.
     pub goes_on: fn(&Path) -> Option<String>,
 }
 
@@ -118,13 +118,13 @@ pub fn closeloop() -> Long {
     }
 }
 
-/// A training goes on from the epoch of its checkpoint.
+/// Training continues from the epoch of its checkpoint.
 fn epoch(root: &Path) -> Option<String> {
     let places = ["out", ".out.previous"].map(|place| root.join(place).join("checkpoint.json"));
     let text = places.iter().find_map(|file| fs::read(file).ok())?;
     let manifest: Value = serde_json::from_slice(&text).unwrap();
     Some(format!(
-        "note: out goes on from epoch {}\n",
+        "note: out resumes from epoch {}\n",
         manifest["epoch"]
     ))
 }

@@ -7,10 +7,10 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// What befalls a run.
+/// A disturbance of a run.
 #[derive(Debug, Clone, Copy)]
 pub enum Fault {
-    /// A fault of this kind (see tests/clients/faults.c) at so many changes of files.
+    /// A fault of this kind (see tests/clients/faults.c) at the `at`-th file change.
     Call { kind: &'static str, at: usize },
     /// A signal at this time.
     Signal { name: &'static str, after: Duration },
@@ -88,7 +88,8 @@ impl Layer {
         }
     }
 
-    /// Run a command undisturbed. The letters of all changes of files, and all files as they were given their names.
+    /// Run a command undisturbed. Returns the letters of all file changes, and all files as they were when they got
+    /// their names.
     pub fn traced(
         &self,
         root: &Path,

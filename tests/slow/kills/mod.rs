@@ -1,7 +1,7 @@
 //! Long commands that are killed, that find the disk full and whose writes come short, at instants drawn at random, half of them
 //! the very changes of files. What they leave is whole, and the same command then ends with the bytes of an undisturbed run.
 //!
-//! `RESIDYN_KILLS` is the number of disturbances of each command, 4 where it is not set. `--nocapture` shows the table of
+//! `RESIDYN_KILLS` is the number of disturbances per command, 4 if it is not set. `--nocapture` shows the table of
 //! docs/robustness.md.
 
 #![cfg(target_os = "linux")]
@@ -23,7 +23,8 @@ use tempfile::TempDir;
 use self::commands::Long;
 use self::faults::{Ended, Fault, Layer};
 
-/// Kinds of faults: at changes of files of these letters (any, where there are none), or, in capitals, signals at a time.
+/// Kinds of faults: at file changes with these letters (any change if there are none), or, in capitals, signals at a
+/// random time.
 const KINDS: [(&str, &str); 12] = [
     ("kill", ""),
     ("full", "omw"),
@@ -39,7 +40,7 @@ const KINDS: [(&str, &str); 12] = [
     ("denied", "omru"),
 ];
 
-/// Every fourth disturbed run is disturbed once more before it may end.
+/// Every fourth disturbed run is disturbed a second time before it may end.
 const TWICE: usize = 4;
 
 type Files = BTreeMap<PathBuf, Vec<u8>>;
@@ -72,16 +73,16 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// A command and what it does undisturbed.
+/// A command and its undisturbed run.
 struct Harness {
     scratch: TempDir,
     layer: Layer,
     long: Long,
-    /// What it leaves.
+    /// The files that it leaves.
     end: Files,
-    /// Each file as it ever was once it had its name.
+    /// Every version of each file from when it got its name.
     ever: Vec<(String, Vec<u8>)>,
-    /// A letter for each change of files.
+    /// A letter for each file change.
     trace: String,
     took: Duration,
 }
@@ -134,7 +135,7 @@ impl Harness {
         Fault::Call { kind, at }
     }
 
-    /// Disturb the command in a new folder, and let it end; what is wrong with what it leaves.
+    /// Disturb the command in a new folder, and let it end; the error says what is wrong with the files that it leaves.
     fn disturb(&self, number: usize) -> Result<(), String> {
         let mut rng = ChaCha8Rng::seed_from_u64(number as u64);
         let root = self.scratch.path().join(number.to_string());
@@ -155,7 +156,7 @@ impl Harness {
         Ok(())
     }
 
-    /// What is wrong with the end of a disturbed run.
+    /// The error says what is wrong with the end of a disturbed run.
     fn check(&self, root: &Path, fault: &Fault, ended: &Ended) -> Result<(), String> {
         let found = files(root);
         for (path, bytes) in &found {
@@ -169,7 +170,7 @@ impl Harness {
         let as_it_should = match fault.kind() {
             "kill" | "KILL" | "torn" => ended.by(9),
             "term" | "TERM" => ended.by(15),
-            // Before there is a handler it is the signal that ends a program.
+            // Before a handler is installed, the signal ends the program.
             "int" | "INT" => ended.by(2) || ended.status.code() == Some(130),
             "full" | "sync" | "rename" | "denied" => {
                 tells(&ended.said, fault)?;
@@ -183,12 +184,12 @@ impl Harness {
         }
     }
 
-    /// Whether a file is one that an undisturbed run has, too, if only for a while.
+    /// Whether a file also exists in an undisturbed run, if only for a while.
     fn is_whole(&self, path: &Path, bytes: &[u8], fault: &Fault) -> Result<(), String> {
         let name = name(path);
         let mut versions = self.ever.iter().filter(|(other, _)| *other == name);
         let is_there = match name.ends_with(".jsonl") {
-            // Lines are added to it. The last may be cut by a kill alone.
+            // Lines are appended to it. Only a kill may cut the last line.
             true => {
                 let whole = bytes.iter().rposition(|byte| *byte == b'\n');
                 let whole = &bytes[..whole.map_or(0, |last| last + 1)];
@@ -203,7 +204,7 @@ impl Harness {
         }
     }
 
-    /// Let the command end: with the bytes of the undisturbed run, and without doing again what is done.
+    /// Let the command end with the bytes of the undisturbed run, without repeating finished work.
     fn go_on(&self, root: &Path) -> Result<(), String> {
         let said = (self.long.goes_on)(root);
         let done = stretches(root);
@@ -221,7 +222,7 @@ impl Harness {
         self.compare(files(root), |_| true)
     }
 
-    /// Bytes of the undisturbed run's files that are not as they should be after a disturbance that was not survived.
+    /// Bytes of the undisturbed run's files that are missing or wrong after a fatal disturbance.
     fn lost(&self, number: usize) -> usize {
         let found = files(&self.scratch.path().join(number.to_string()));
         let lost = self
@@ -251,7 +252,7 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap().to_str().unwrap().to_owned()
 }
 
-/// The error names the user's folder, no temporary one, and what to do.
+/// The error names the user's folder instead of a temporary one, and says what to do.
 fn tells(said: &str, fault: &Fault) -> Result<(), String> {
     let last = said.lines().last().unwrap_or_default();
     let remedy = match fault.kind() {
@@ -266,7 +267,7 @@ fn tells(said: &str, fault: &Fault) -> Result<(), String> {
     }
 }
 
-/// The recorded motion of all rounds that are done, and the file on the disk that each is.
+/// The recorded motion of all finished rounds, and the inode of each file.
 fn stretches(root: &Path) -> BTreeMap<PathBuf, u64> {
     let all = files(root);
     let rounds = all
@@ -299,8 +300,8 @@ fn survives(long: Long, first: usize) {
         harness.trace.len(),
         count - failures.len(),
     );
-    let told: Vec<String> = failures.into_iter().map(|(_, told)| told).collect();
-    assert!(told.is_empty(), "{}", told.join("\n\n"));
+    let message: Vec<String> = failures.into_iter().map(|(_, message)| message).collect();
+    assert!(message.is_empty(), "{}", message.join("\n\n"));
 }
 
 #[test]

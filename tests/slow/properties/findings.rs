@@ -32,7 +32,7 @@ const RENUMBERED: &str = include_str!(concat!(
     "/tests/fixtures/acrobot-renumbered.toml"
 ));
 
-/// Rigs of one joint and of two that are recorded in seconds; sizes of effects are drawn.
+/// Rigs of one and of two joints, recorded in seconds; sizes of effects are drawn at random.
 const ONE: &str = "model = \"pendulum\"\nparameters = { C_g = -17.4, C_i = 4.6 }\n\
     sensor = { rate_hz = 100, position_noise = 1e-3, position_step = 0 }\n\
     excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }\n\
@@ -121,7 +121,7 @@ impl Rig {
         )
     }
 
-    /// A rig that lacks nothing.
+    /// A rig whose model lacks nothing.
     pub fn as_declared() -> Self {
         Self::new(ONE, PENDULUM, &[], 1)
     }
@@ -169,7 +169,7 @@ impl Written {
         }
     }
 
-    /// The numbers of each column as this makes them, by its name.
+    /// The numbers of each column after applying `change`, which is given the column's name.
     fn with(mut self, change: impl Fn(&str, f64) -> f64) -> Self {
         for (header, rows) in &mut self.logs {
             for row in rows {
@@ -252,7 +252,7 @@ impl Written {
         (model, (1..).zip(&self.logs).map(write).collect())
     }
 
-    /// What is found, where the logs are given in this order, the last for the test.
+    /// The findings when the logs are given in this order, the last as the test log.
     fn findings(&self, order: [usize; 4]) -> Findings {
         let folder = tempfile::tempdir().unwrap();
         let (model, paths) = self.write(folder.path());
@@ -265,15 +265,16 @@ impl Written {
     }
 }
 
-/// What is said of a rig.
+/// The findings for a rig.
 #[derive(Debug, Clone)]
 struct Findings {
     verdict: String,
-    /// Established ones, then supported ones: name and joint.
+    /// Established effects, then supported ones: name and joint.
     effects: Vec<(String, usize)>,
     /// Effects of each alternative.
     alternatives: Vec<Vec<(String, usize)>>,
-    /// Values of the effects, then of the declared parameters; then what is left unexplained, which depends on random draws.
+    /// Values of the effects, then of the declared parameters; then the unexplained residual, which depends on random
+    /// draws.
     numbers: Vec<(String, f64)>,
 }
 
@@ -303,7 +304,7 @@ impl Findings {
         let declared = outcome.models.after.model.parameters.iter();
         let declared = declared.map(|parameter| (parameter.name.clone(), parameter.value));
         let mut numbers: Vec<_> = found().flat_map(values).chain(declared).collect();
-        let left = &outcome.remainder.unexplained;
+        let left = &outcome.diagnostics.unexplained;
         numbers.push(("unexplained".to_owned(), left.fraction));
         let alternative = |rival: &residyn_core::closeloop::Alternative| {
             let each = rival.effects.iter();
@@ -323,7 +324,7 @@ impl Findings {
         }
     }
 
-    /// The same with each joint called by what `number` makes of its number, in the order of the joints.
+    /// The same findings with joints renumbered by `number` and sorted.
     fn renumbered(mut self, number: impl Fn(usize) -> usize) -> Self {
         let all = self
             .effects

@@ -8,7 +8,7 @@ use super::{cases, same_number};
 
 const INPUTS: [&str; 3] = ["x", "y", "p_1"];
 
-/// Numbers of the size that most have.
+/// Numbers of usual size.
 fn usual_number() -> impl Strategy<Value = String> {
     prop_oneof![
         3 => (0..13_u32).prop_map(|n| n.to_string()),
@@ -26,12 +26,12 @@ fn number() -> impl Strategy<Value = String> {
     ]
 }
 
-/// Formulas with every operation, in which parentheses stand where they need not and are missing where they might.
+/// Formulas with every operation, with some redundant parentheses and some omitted where they might be expected.
 pub fn formula() -> impl Strategy<Value = String> {
     formula_of(number())
 }
 
-/// As [`formula`], with numbers of the size that most have.
+/// As [`formula`], with numbers of usual size.
 pub fn usual_formula() -> impl Strategy<Value = String> {
     formula_of(usual_number())
 }
@@ -147,18 +147,18 @@ fn derived(formula: &str, by: usize) -> Program {
     graph.finish(&[slope])
 }
 
-/// A slope from differences, and how far it may be off.
+/// A slope from differences, and its possible error.
 struct Difference {
     slope: f64,
     error: f64,
 }
 
-/// Central differences over h and h / 2, extrapolated (Richardson). Their error has two parts: of the polynomial, which is below
-/// the difference between the two where they converge as a smooth function's do, by a factor of 4 from each h to the next half;
-/// and of rounding, of the input and as the function's own values show: over a few spacings of floating-point numbers it should not
-/// bend.
-/// `None` where it does not converge so: at a kink, near a pole, or where rounding is all that is left, of the value or of
-/// the input beside a large number.
+/// Central differences over h and h / 2, extrapolated (Richardson). Their error has two parts: the truncation error,
+/// which is below the difference between the two if they converge as a smooth function's do, by a factor of 4 for each
+/// halving of h; and rounding, of the input and as the function's own values show: over a few spacings of
+/// floating-point numbers they should not bend.
+/// `None` if the differences do not converge in this way: at a kink, near a pole, or when only rounding is left, of the
+/// value or of the input next to a large number.
 fn difference(program: &Program, point: &[f64; 3], by: usize) -> Option<Difference> {
     let at = |moved: f64| {
         let mut point = *point;
@@ -177,7 +177,7 @@ fn difference(program: &Program, point: &[f64; 3], by: usize) -> Option<Differen
     let noise = 8.0 * rounding / h;
     let [first, second] = [(coarse - fine).abs(), (fine - finest).abs()];
     let converges = second <= 0.3 * first || first <= noise;
-    // Of a kink, the slopes to both sides stay apart however near they are taken.
+    // At a kink, the slopes on both sides stay apart at any distance.
     let apart = |h: f64| (at(h) - 2.0 * at(0.0) + at(-h)).abs() / h;
     let converges = converges && apart(h / 4.0) <= 0.75 * apart(h / 2.0) + noise;
     let slope = finest + (finest - fine) / 3.0;
@@ -196,7 +196,7 @@ fn derivatives_are_what_differences_tend_to() {
     let mut runner = TestRunner::new(config.clone());
     let (mut compared, mut singular) = (0, 0);
     for _ in 0..config.cases {
-        // Of numbers of any size most formulas overflow, or lose their inputs beside them.
+        // With numbers of any size, most formulas overflow or lose their inputs to rounding.
         let formula = usual_formula();
         let formula = formula.new_tree(&mut runner).unwrap().current();
         let point = prop::array::uniform3(-4.0..4.0_f64);
@@ -207,12 +207,12 @@ fn derivatives_are_what_differences_tend_to() {
                 continue;
             };
             let found = derived(&formula, by).eval(&point)[0];
-            // Such as the root of x y by x where y is 0: infinite, times nothing.
+            // For example the root of x y with respect to x at y = 0: infinity times zero.
             if found.is_nan() {
                 singular += 1;
                 continue;
             }
-            // Rounding within a formula may cancel in all values that are looked at.
+            // Rounding within a formula may cancel in all values used here.
             assert!(
                 (found - slope).abs() <= error + 1e-9 * slope.abs(),
                 "{formula} by {} at {point:?}: {found}, and {slope} to {error:e} by differences",
@@ -221,7 +221,7 @@ fn derivatives_are_what_differences_tend_to() {
             compared += 1;
         }
     }
-    // Most have no input in them, or are steps, or overflow.
+    // Most contain no input, are steps, or overflow.
     assert!(compared > config.cases / 4, "{compared}");
     assert!(100 * singular < compared, "{singular} of {compared}");
 }

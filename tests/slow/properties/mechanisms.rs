@@ -18,7 +18,7 @@ fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(-size..size).prop_map(Vector3::from)
 }
 
-/// Any orientation, or one by quarter turns as most robots have.
+/// Any orientation, or quarter turns as most robots have.
 fn rotation() -> impl Strategy<Value = Matrix3<f64>> {
     let axis = prop_oneof![
         Just(Vector3::<f64>::x()),
@@ -42,7 +42,7 @@ fn rotation() -> impl Strategy<Value = Matrix3<f64>> {
     prop_oneof![any, quarter]
 }
 
-/// A body of density above zero: the principal moments of three spreads of mass.
+/// A body with positive density: the principal moments of three spreads of mass.
 fn inertia() -> impl Strategy<Value = Inertia> {
     let spreads = prop::array::uniform3(1e-3..0.1_f64);
     (0.2..5.0_f64, vector(0.3), spreads, rotation()).prop_map(
@@ -92,7 +92,7 @@ fn joint() -> impl Strategy<Value = Joint> {
     )
 }
 
-/// A chain of so many joints.
+/// A chain with this number of joints.
 pub fn chain(joints: RangeInclusive<usize>) -> impl Strategy<Value = Chain> {
     prop::collection::vec(joint(), joints).prop_map(|mut joints| {
         for (k, joint) in (1..).zip(&mut joints) {
@@ -128,7 +128,7 @@ fn same(found: &Dynamics, wanted: &Dynamics) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// What a format says of a chain, or why it does not carry it.
+/// A chain as read back from a format, or why the format does not carry it.
 fn through(format: &str, model: &Model) -> Result<Result<Chain, String>, TestCaseError> {
     let format = find(format).unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -137,7 +137,7 @@ fn through(format: &str, model: &Model) -> Result<Result<Chain, String>, TestCas
     match format.write(&exported, &path) {
         Err(error @ ExportError::Model { .. }) => Ok(Err(error.to_string())),
         Err(error) => Err(TestCaseError::fail(error.to_string())),
-        // Only MuJoCo reads the gravity of such a file.
+        // Only MuJoCo reads the gravity in such a file.
         Ok(_)
             if (format.not_carried)(&exported)
                 .iter()
@@ -154,7 +154,7 @@ fn through(format: &str, model: &Model) -> Result<Result<Chain, String>, TestCas
     }
 }
 
-/// A chain with what a format carries of it.
+/// The part of a chain that a format carries.
 fn carried(chain: &Chain, format: &str) -> Chain {
     let mut chain = chain.clone();
     for drivetrain in chain.joints.iter_mut().map(|joint| &mut joint.drivetrain) {
@@ -177,7 +177,7 @@ proptest! {
             let again = match through(format, &model)? {
                 Ok(again) => again,
                 Err(why) => {
-                    // Of equations in closed form only some kinds of mechanism are recovered.
+                    // From equations in closed form, only some kinds of mechanism are recovered.
                     prop_assert!((2..=3).contains(&chain.joints.len()), "{}: {}", format, why);
                     continue;
                 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use proptest::prelude::*;
 use residyn_core::data::{Joint, Quantity};
 use residyn_core::model::chain::model_text;
-use residyn_core::model::{Effect, FittedEffect, Library, Model, OwnValue, Status};
+use residyn_core::model::{Effect, FittedEffect, Library, Model, PerLogValue, Status};
 
 use super::mechanisms::chain;
 use super::{cases, same_number};
@@ -223,7 +223,7 @@ fn system(joints: usize) -> BoxedStrategy<String> {
                 .collect();
             let _ = writeln!(text, "prismatic = {sliding:?}");
             if let Some(widths) = widths {
-                let _ = writeln!(text, "sign_width = {widths:?}");
+                let _ = writeln!(text, "smoothing_velocity = {widths:?}");
             }
             text + "\n"
         })
@@ -279,7 +279,7 @@ fn declaration() -> BoxedStrategy<String> {
         .boxed()
 }
 
-/// Random numbers to choose and size what a model has besides its equations.
+/// Random numbers to choose and size a model's parts other than its equations.
 #[derive(Debug, Clone)]
 struct Draws(Vec<f64>);
 
@@ -304,7 +304,7 @@ fn draws() -> impl Strategy<Value = Draws> {
     prop::collection::vec(0.0..1.0_f64, 40).prop_map(Draws)
 }
 
-/// An effect as a fit might find it: values within their bounds, intervals, values in single logs.
+/// An effect as a fit might find it: values within their bounds, intervals, per-log values.
 fn effect(model: &Model, effects: &[Effect], draws: &mut Draws) -> Option<FittedEffect> {
     let kind = &effects[draws.index(effects.len())];
     let joint = Joint::at(draws.index(model.joints));
@@ -327,7 +327,7 @@ fn effect(model: &Model, effects: &[Effect], draws: &mut Draws) -> Option<Fitted
             "odd \"name\" = 'é'.csv",
         ];
         if parameter.per_log {
-            found.own.extend(logs.map(|log| OwnValue {
+            found.own.extend(logs.map(|log| PerLogValue {
                 log: log.to_owned(),
                 parameter: k,
                 value: value(),
@@ -346,7 +346,7 @@ fn effect(model: &Model, effects: &[Effect], draws: &mut Draws) -> Option<Fitted
     found.fixed = draws.index(4) == 0;
     found.status = [None, Some(Status::Established), Some(Status::Supported)][draws.index(3)];
     let fits = model.check_effect(&found, &model.effects).is_ok();
-    // The values of its parameters may not be those that it is meant for.
+    // Its parameter values may not be meant for this model.
     fits.then_some(found)
 }
 
@@ -369,7 +369,7 @@ fn fitted(model: &Model, draws: &mut Draws) -> Model {
         .map(|_| 1e-6 + 0.1 * draws.next())
         .collect();
     match draws.index(2) {
-        0 => model.with_sign_widths(widths),
+        0 => model.with_smoothing_velocities(widths),
         _ => model,
     }
 }
@@ -400,11 +400,11 @@ fn same(a: &Model, b: &Model, text: &str) -> Result<(), TestCaseError> {
         )
     );
     prop_assert_eq!(&a.columns, &b.columns, "{}", text);
-    prop_assert_eq!(&a.sign_width, &b.sign_width, "{}", text);
+    prop_assert_eq!(&a.smoothing_velocity, &b.smoothing_velocity, "{}", text);
     prop_assert_eq!(a.parameters.len(), b.parameters.len());
     for (a, b) in a.parameters.iter().zip(&b.parameters) {
         prop_assert!(same_number(a.value, b.value), "{}", text);
-        // The scale of steps is that of the value in the file.
+        // The step scale follows the value in the file.
         let (mut a, mut b) = (a.clone(), b.clone());
         (a.scale, b.scale) = (1.0, 1.0);
         prop_assert_eq!(a, b, "{}", text);
@@ -416,14 +416,14 @@ fn same(a: &Model, b: &Model, text: &str) -> Result<(), TestCaseError> {
             (&b.effect, b.joint, b.fixed, b.status)
         );
         prop_assert_eq!(&a.values, &b.values, "{}", text);
-        let of = |own: &OwnValue| (own.parameter, own.value.to_bits(), own.ci95);
+        let of = |own: &PerLogValue| (own.parameter, own.value.to_bits(), own.ci95);
         prop_assert_eq!(
             a.own.iter().map(of).collect::<Vec<_>>(),
             b.own.iter().map(of).collect::<Vec<_>>(),
             "{}",
             text
         );
-        let named = |own: &OwnValue| own.log_name();
+        let named = |own: &PerLogValue| own.log_name();
         prop_assert_eq!(
             a.own.iter().map(named).collect::<Vec<_>>(),
             b.own.iter().map(named).collect::<Vec<_>>()

@@ -11,7 +11,7 @@ use super::cases;
 use super::formulas::{point, usual_formula};
 use crate::support::clients::there_are;
 
-/// Formulas of a model: as many as it has joints.
+/// Formulas per model: as many as it has joints.
 const FORMULAS: usize = 12;
 
 /// Formulas that a model may have.
@@ -21,7 +21,7 @@ fn formula() -> impl Strategy<Value = String> {
     })
 }
 
-/// A model whose accelerations are these.
+/// A model whose accelerations are these formulas.
 fn model(formulas: &[String]) -> ExportModel {
     let accelerations = (1..).zip(formulas);
     let accelerations: String = accelerations
@@ -35,11 +35,11 @@ fn model(formulas: &[String]) -> ExportModel {
     ExportModel::of_system(&model.unwrap(), Integrator::RK4, 0.01, json!({}))
 }
 
-/// States in which x and y are these.
+/// States in which x and y have these values.
 fn samples(points: &[[f64; 3]]) -> Samples {
     let state = |[x, y, _]: &[f64; 3]| {
         let mut state = vec![0.0; 2 * FORMULAS];
-        // Clients in single precision get the same.
+        // Clients in single precision get the same values.
         state[0] = f64::from(*x as f32);
         state[1] = f64::from(*y as f32);
         state
@@ -55,7 +55,7 @@ fn samples(points: &[[f64; 3]]) -> Samples {
 }
 
 proptest! {
-    // Each one compiles a program.
+    // Each case compiles a program.
     #![proptest_config(ProptestConfig { max_shrink_iters: 300, ..cases(8) })]
 
     #[test]

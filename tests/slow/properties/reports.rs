@@ -16,7 +16,7 @@ use crate::support::clients::client;
 use crate::support::paths::schema_path;
 use crate::support::{answers, text};
 
-/// Folders of reports: of an effect that is found, and of none; of one joint and of two.
+/// Folders of reports: with and without an effect found, of one joint and of two.
 fn reports() -> &'static [PathBuf] {
     static FOLDER: OnceLock<(TempDir, Vec<PathBuf>)> = OnceLock::new();
     let (_, reports) = FOLDER.get_or_init(|| {
@@ -49,7 +49,7 @@ fn reports() -> &'static [PathBuf] {
     reports
 }
 
-/// Every report of these.
+/// The content of each of these reports.
 fn values() -> Vec<Value> {
     let read = |folder: &PathBuf| fs::read_to_string(folder.join("report.json")).unwrap();
     reports()
@@ -74,7 +74,7 @@ fn reports_of_all_kinds_match_the_published_schema() {
     }
 }
 
-/// Every number that is no whole one, in the order of the value.
+/// Every number that is not an integer, in the order of the value.
 fn leaves<'v>(value: &'v mut Value, found: &mut Vec<&'v mut Value>) {
     if value.is_f64() {
         found.push(value);

@@ -8,7 +8,7 @@ use residyn_core::model::Model;
 /// One body, in the frame of its joint, whose z is the axis.
 #[derive(Debug, Clone)]
 struct Link {
-    /// The frame in that of the body before where the joint is at zero.
+    /// The frame in the previous body's frame, with the joint at zero.
     rotation: Matrix3<f64>,
     origin: Vector3<f64>,
     /// kg
@@ -33,7 +33,7 @@ pub(super) struct Bodies {
 }
 
 impl Bodies {
-    /// Those that a model of a chain declares.
+    /// The bodies that a model of a chain declares.
     pub fn of(model: &Model) -> Option<Self> {
         let values: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
         let mechanism = model.mechanism(&values)?;
@@ -54,7 +54,7 @@ impl Bodies {
         })
     }
 
-    /// The same arm where the mass of each body, and its size, are off by shares within this range, up or down.
+    /// The same arm with each body's mass and size off by shares within this range, up or down.
     pub fn off_by(&self, [least, most]: [f64; 2], rng: &mut impl Rng) -> Self {
         let mut factor = || {
             let off = rng.random_range(least..=most);
@@ -92,11 +92,11 @@ impl Bodies {
         (last.mass, last.centre) = (whole, centre);
     }
 
-    /// The torques, N m, that angles, velocities and accelerations take.
+    /// The torques, N m, for these angles, velocities and accelerations.
     pub fn torques(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
         let axis = Vector3::z();
         let (mut spin, mut turning) = (Vector3::zeros(), Vector3::zeros());
-        // A frame that falls with gravity feels none.
+        // A frame that falls with gravity feels no gravity.
         let mut moving = -self.gravity;
         let mut outward = Vec::new();
         for (k, link) in self.links.iter().enumerate() {

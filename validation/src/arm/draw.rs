@@ -8,12 +8,12 @@ use super::{Arm, Lacks};
 use crate::hidden::Hidden;
 use residyn_core::data::Joint;
 
-/// Friction in shares of what the motion of the bodies takes of a joint, root mean square, or of a twentieth of what it takes of
-/// the strongest joint where that is more: wrists have more friction than load.
+/// Friction as a share of the root-mean-square torque that the bodies' motion takes at a joint, or of a twentieth of
+/// the strongest joint's if that is more: wrists have more friction than load.
 const SHARES: [f64; 2] = [0.08, 0.3];
 const LEAST: f64 = 0.05;
 
-/// Seconds over which these are taken.
+/// Seconds over which these torques are taken.
 const SECONDS: u32 = 20;
 
 impl Arm {
@@ -31,7 +31,7 @@ impl Arm {
         match self.lacks {
             Lacks::Nothing | Lacks::Friction => {}
             Lacks::LoadFriction => {
-                // Where the bodies load a gear.
+                // A joint where the bodies load the gear.
                 let joint = joints[rng.random_range(1..3)];
                 effects.push(hidden(
                     "load_friction",
@@ -81,7 +81,7 @@ fn friction(joint: Joint, size: f64, speed: f64, rng: &mut impl Rng) -> Hidden {
             hidden("stribeck_friction", joint, &values)
         }
         _ => {
-            // Its level at the typical speed is the one drawn.
+            // The drawn level is the friction at the typical speed.
             let rise = level / (speed / slow).asinh();
             hidden(
                 "degressive_friction",
@@ -103,7 +103,7 @@ fn hidden(name: &str, joint: Joint, values: &[(&str, f64)]) -> Hidden {
     }
 }
 
-/// For each joint the torque (N m) by which friction is drawn, and the root mean square of its speed (rad/s).
+/// For each joint, the torque (N m) that scales its friction, and the root mean square of its speed (rad/s).
 fn typical(bodies: &Bodies, motion: &Motion) -> (Vec<f64>, Vec<f64>) {
     let times = (0..20 * SECONDS).map(|k| f64::from(k) / 20.0);
     let at = |time| {

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::Bodies;
 use crate::hidden::Hidden;
 
-/// Of one joint: the torque that a velocity takes.
+/// Friction law of one joint: torque by velocity.
 type Law = Box<dyn Fn(f64) -> f64 + Sync>;
 
 /// A motor that turns with its joint and `ratio` times the next one.
@@ -29,10 +29,10 @@ pub(super) struct Friction {
 }
 
 impl Friction {
-    /// Those with these effects; a load at the tip is put on the bodies.
+    /// The drivetrains with these effects; a load at the tip is added to the bodies.
     ///
     /// # Errors
-    /// An effect that no arm of the bench has, or a number that is missing.
+    /// An effect that no arm of the bench has, or a missing number.
     pub fn of(effects: &[Hidden], joints: usize, bodies: &mut Bodies) -> Result<Self, String> {
         let mut all = Self {
             laws: (0..joints).map(|_| Vec::new()).collect(),
@@ -92,7 +92,7 @@ impl Friction {
         Ok(())
     }
 
-    /// The torques to command for those that the bodies take.
+    /// The torques to command for the torques that the bodies need.
     pub fn commanded(&self, needed: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
         let mut torques = needed.to_vec();
         for (j, torque) in torques.iter_mut().enumerate() {
@@ -107,7 +107,7 @@ impl Friction {
             torques[motor.joint + 1] += motor.ratio * own;
         }
         for (j, torque) in torques.iter_mut().enumerate() {
-            // What arrives is the command less its share, against the motion.
+            // The joint receives the command less the gear's share, against the motion.
             *torque /= 1.0 - self.by_load[j] * direction(qd[j]) * direction(*torque);
         }
         torques

@@ -17,18 +17,18 @@ use super::recording::log_name;
 use residyn_core::data::Log;
 use residyn_core::model::Model;
 
-/// What an arm hides beside bodies that are not as they were drawn.
+/// What an arm hides in addition to bodies that differ from their model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Lacks {
     Nothing,
     /// One of four kinds on every joint.
     Friction,
-    /// The same, and friction by the load of one joint.
+    /// Friction as above, and load-dependent friction on one joint.
     LoadFriction,
-    /// The same, and a motor that turns with two joints.
+    /// Friction as above, and a motor that turns with two joints.
     Coupling,
-    /// The same, and a load at the tip.
+    /// Friction as above, and a load at the tip.
     Payload,
 }
 
@@ -61,17 +61,17 @@ pub struct Arm {
 }
 
 impl Arm {
-    /// What this arm hides.
+    /// The effects that this arm hides.
     ///
     /// # Errors
-    /// A model that is no chain of bodies.
+    /// A model that is not a chain of bodies.
     pub(crate) fn hidden(&self, model: &Model, rng: &mut impl Rng) -> Result<Vec<Hidden>, String> {
         let bodies = Bodies::of(model).ok_or("its model is no chain of bodies")?;
         let motion = Motion::draw(&self.amplitude, rng);
         Ok(self.draw(&bodies, &motion, rng))
     }
 
-    /// Logs of the arm with these effects, on bodies that are off.
+    /// Logs of the arm with these effects, on bodies that differ from their model.
     ///
     /// # Errors
     /// As [`Arm::hidden`], and effects that an arm cannot have.

@@ -3,7 +3,7 @@ use thiserror::Error;
 /// Why no rig can be drawn by the rules of a grid.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum DrawError {
-    /// A number is a multiple of what there is not.
+    /// A number is a multiple of an unknown scale.
     #[error("no scale `{0}`")]
     NoScale(String),
     /// A number of an effect cannot be drawn.

@@ -9,16 +9,16 @@ use super::recipe::{Drawn, Recipe};
 use crate::cell::last_is_test;
 use crate::grid::Cell;
 use crate::hidden::Hidden;
-use crate::told::{Told, at_truth};
+use crate::identifiable::{Told, at_truth};
 use residyn_core::closeloop::{Settings, Split};
 use residyn_core::model::{Library, Model};
 
-/// Draws of single effects before the whole rig is drawn anew, and whole rigs before giving up.
+/// Draws of single effects before the whole rig is redrawn, and draws of whole rigs before giving up.
 const EFFECTS: usize = 16;
 const RIGS: usize = 16;
 
 impl Recipe {
-    /// A rig for `cell` each of whose effects matters: one that does not is drawn again.
+    /// A rig for `cell` in which every effect matters: effects that do not matter are redrawn.
     ///
     /// # Errors
     /// As [`Recipe::draw`], or rules by which no effect matters.
@@ -44,7 +44,7 @@ impl Recipe {
         ))
     }
 
-    /// The place of an effect that does not matter, if there is one.
+    /// The index of an effect that does not matter, if there is one.
     fn idle(
         &self,
         cell: &Cell,
@@ -59,21 +59,21 @@ impl Recipe {
         let (inside, outside) = drawn.effects.split_at(self.effects);
         let (split, declared) = record(cell, drawn, inside, model)?;
         let known = at_truth(model, &declared);
-        let Some(told) = Told::fit(&known, library, &split, &settings, inside, &declared) else {
+        let Some(message) = Told::fit(&known, library, &split, &settings, inside, &declared) else {
             return Ok(Some(0));
         };
         let matters = |rise: f64| rise >= self.rules.matters;
-        if let Some(place) = (0..inside.len()).find(|k| !matters(told.rises_without(*k))) {
+        if let Some(place) = (0..inside.len()).find(|k| !matters(message.rises_without(*k))) {
             return Ok(Some(place));
         }
         for k in 0..outside.len() {
-            // Beside the best that the library has in its place, and against the same rig without it.
+            // Compared with the library's best stand-in for it, relative to the same rig without it.
             let present = [inside, &outside[..=k]].concat();
             let (split, declared) = record(cell, drawn, &present, model)?;
             let nearest = [inside, &drawn.stand_ins[k]].concat();
             let known = at_truth(model, &declared);
             let best = Told::fit(&known, library, &split, &settings, &nearest, &declared);
-            if best.is_some_and(|best| !matters(best.error() / told.error())) {
+            if best.is_some_and(|best| !matters(best.error() / message.error())) {
                 return Ok(Some(inside.len() + k));
             }
         }

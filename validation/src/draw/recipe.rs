@@ -19,7 +19,7 @@ use crate::sensors::Flaws;
 use residyn_core::data::Joint;
 use residyn_core::model::Model;
 
-/// What a rig is drawn from.
+/// The recipe that a rig is drawn from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Recipe {
     pub mechanics: Mechanics,
@@ -27,7 +27,7 @@ pub struct Recipe {
     /// Typical top speed of each joint \[rad/s\].
     pub speed: Vec<f64>,
     pub rules: Rules,
-    /// Number of effects of the library, and of others.
+    /// Number of library effects, and of effects that the library lacks.
     pub effects: usize,
     pub outside: usize,
 }
@@ -36,9 +36,9 @@ pub struct Recipe {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawn {
     pub simulation: Simulation,
-    /// Those of the library come first.
+    /// Library effects come first.
     pub effects: Vec<Hidden>,
-    /// Of each effect that the library lacks, those that are fitted in its place.
+    /// For each effect that the library lacks, the effects that are fitted in its place.
     pub stand_ins: Vec<Vec<Hidden>>,
 }
 
@@ -72,7 +72,7 @@ impl Recipe {
     /// A rig.
     ///
     /// # Errors
-    /// Rules that leave no effect to draw, or name a scale that there is not.
+    /// Rules that leave no effect to draw, or name an unknown scale.
     pub fn draw(&self, rng: &mut impl Rng) -> Result<Drawn, DrawError> {
         let mut drawn = Drawn {
             simulation: Simulation {
@@ -89,7 +89,7 @@ impl Recipe {
         Ok(drawn)
     }
 
-    /// Draw the effect at a place anew, or for the first time.
+    /// Draw or redraw the effect at this index.
     ///
     /// # Errors
     /// As [`Recipe::draw`].
@@ -125,7 +125,7 @@ impl Recipe {
         Ok(())
     }
 
-    /// What may be drawn at a place.
+    /// The effects that may be drawn at this index.
     fn kinds(&self, place: usize) -> &BTreeMap<String, Kind> {
         if place < self.effects {
             &self.rules.effects
@@ -142,7 +142,7 @@ impl Recipe {
     /// Values from which the free parameters of the model file start, given the true ones.
     ///
     /// # Errors
-    /// A free parameter of which the true value is not known.
+    /// A free parameter whose true value is not known.
     pub fn start(
         &self,
         model: &Model,
@@ -161,7 +161,7 @@ impl Recipe {
         .collect()
     }
 
-    /// What numbers of effects on a joint are multiples of.
+    /// Scales for the numbers of effects on a joint.
     fn scales(&self, joint: Joint) -> BTreeMap<String, f64> {
         let (torque, speed) = (self.driving.torque[joint], self.speed[joint]);
         let inertia = self.mechanics.mass([0.0; 2])[joint.index()][joint.index()];

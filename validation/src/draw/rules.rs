@@ -8,14 +8,14 @@ use super::size::Size;
 use crate::condition::Loop;
 use residyn_core::data::Joint;
 
-/// By which rigs are drawn.
+/// The rules by which rigs are drawn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rules {
     pub condition: ConditionRules,
     /// Free parameters of the model file start at the true value, times or divided by up to this factor.
     pub start: Size,
-    /// An effect matters without which the best fit of what is left has at least this many times the error.
+    /// An effect matters if the best fit without it has at least this many times the error.
     pub matters: f64,
     /// Effects of the library, by name.
     pub effects: BTreeMap<String, Kind>,
@@ -29,19 +29,19 @@ pub struct Rules {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConditionRules {
-    /// The logs of a rig take turns in two of these.
+    /// The logs of a rig alternate between two of these.
     pub loops: Vec<Loop>,
     pub rate_hz: Size,
     pub logs: Size,
     pub seconds: Size,
-    /// Steps of the encoder are a turn divided by two to the power of this.
+    /// The encoder's step is a turn divided by two to this power.
     pub bits: Size,
-    /// Standard deviation of white noise on positions, in steps of the encoder.
+    /// Standard deviation of white noise on positions, in encoder steps.
     pub noise: Size,
     pub jitter: Size,
     pub dropped: Size,
     pub burst: Size,
-    /// Standard deviation of the logged torque, and its step, in parts of the largest torque of the joint.
+    /// Standard deviation of the logged torque, and its step, as shares of the joint's largest torque.
     pub torque_noise: Size,
     pub torque_quantum: Size,
     /// One of these \[s\]; zero for velocities that are differences.
@@ -52,14 +52,15 @@ pub struct ConditionRules {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Kind {
-    /// How often, beside others.
+    /// How often it is drawn, relative to others.
     #[serde(default = "one")]
     pub weight: f64,
-    /// On this joint alone.
+    /// On this joint only.
     #[serde(default)]
     pub joint: Option<Joint>,
     pub values: BTreeMap<String, Size>,
-    /// Of an effect that the library lacks, what of the library comes nearest to it: it has to matter beside them.
+    /// For an effect that the library lacks, the library effects that come nearest to it: it has to matter in addition
+    /// to them.
     #[serde(default)]
     pub stand_ins: Vec<StandIn>,
 }

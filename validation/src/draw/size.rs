@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::DrawError;
 
-/// Numbers from `from` to `to`: evenly spread on a logarithmic scale where both are positive, else on a linear one.
+/// Numbers from `from` to `to`: evenly spread on a logarithmic scale if both are positive, else on a linear one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Size {
@@ -15,8 +15,8 @@ pub struct Size {
     pub from: f64,
     #[serde(default = "one")]
     pub to: f64,
-    /// Multiples of this: of a scale of the joint, or of another number of the same effect that comes before this one
-    /// in the order of the alphabet.
+    /// Multiples of this: of a scale of the joint, or of another number of the same effect that precedes this one
+    /// alphabetically.
     #[serde(default)]
     pub of: Option<String>,
     /// Of either sign.
@@ -58,12 +58,12 @@ impl Size {
         Ok(if negative { -number } else { number } * scale)
     }
 
-    /// A number that is a multiple of nothing.
+    /// A number that is not a multiple of a scale.
     pub fn plain(&self, rng: &mut impl Rng) -> Result<f64, DrawError> {
         self.draw(&BTreeMap::new(), rng)
     }
 
-    /// A number of things.
+    /// A count.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few
     pub fn count(&self, rng: &mut impl Rng) -> Result<usize, DrawError> {
         Ok(self.plain(rng)?.round() as usize)

@@ -44,7 +44,7 @@ pub enum RigsError {
 pub enum Test {
     /// Each log in turn is the test log of a model fitted to the others.
     EachLog,
-    /// One half of each log trains, the other is the test; and back.
+    /// One half of each log trains and the other tests, and vice versa.
     Halves,
 }
 
@@ -67,7 +67,7 @@ pub struct Published {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rig {
     pub name: String,
-    /// Of its logs, within the folder of measured logs.
+    /// Folder of its logs, within the folder of measured logs.
     pub folder: PathBuf,
     pub declared: Declared,
     pub logs: Vec<String>,
@@ -77,7 +77,7 @@ pub struct Rig {
     /// Effects on every joint.
     pub plain: Vec<String>,
     pub published: Vec<Published>,
-    /// By group, test logs of a model fitted to all of `logs`.
+    /// Test logs, by group, of a model fitted to all of `logs`.
     pub also: BTreeMap<String, Vec<String>>,
 }
 
@@ -127,7 +127,7 @@ pub fn read(path: &Path) -> Result<Vec<Rig>, RigsError> {
     rigs(path, &text)
 }
 
-/// The rigs in `text`; files that it names are looked for beside `path`.
+/// The rigs in `text`; file names in it are relative to `path`.
 fn rigs(path: &Path, text: &str) -> Result<Vec<Rig>, RigsError> {
     let wrong = |at: usize, message: String| RigsError::File {
         path: path.to_owned(),
@@ -151,7 +151,7 @@ fn rigs(path: &Path, text: &str) -> Result<Vec<Rig>, RigsError> {
     Ok(rigs)
 }
 
-/// What a rig needs beside the form of its entry; with the place of what is wrong, in bytes.
+/// Check what the form of a rig's entry does not ensure; an error has its place, in bytes.
 fn check(entry: &Entry) -> Result<(), (usize, String)> {
     let least = match entry.test {
         Test::EachLog => 2,

@@ -7,7 +7,8 @@ use residyn_core::data::{Log, statistics::median};
 use residyn_core::model::Dynamics;
 use residyn_core::sim::metric::{Assessment, OpenLoop, assess};
 
-/// The errors of a model on a test log, one a horizon of [`ScoreSettings`](residyn_core::closeloop::ScoreSettings).
+/// The errors of a model on a test log, one for each horizon of
+/// [`ScoreSettings`](residyn_core::closeloop::ScoreSettings).
 pub type LogErrors = Vec<Squares>;
 
 /// Squared position errors of the windows of one log at one horizon.
@@ -29,7 +30,7 @@ pub fn errors_on(model: &Dynamics, logs: &[Log]) -> Vec<LogErrors> {
     by_log(&assess(model, logs, &horizons_s), logs.len())
 }
 
-/// An assessment on so many logs, taken apart by log.
+/// An assessment on `logs` logs, split by log.
 pub fn by_log(assessment: &Assessment, logs: usize) -> Vec<LogErrors> {
     let horizons = &assessment.horizons;
     (0..logs)
@@ -66,7 +67,7 @@ impl Squares {
         }
     }
 
-    /// All windows of several.
+    /// All windows of several `Squares` together.
     pub fn pooled<'s>(all: impl IntoIterator<Item = &'s Self>) -> Self {
         all.into_iter()
             .fold(Self::default(), |mut pooled, squares| {
@@ -84,7 +85,7 @@ impl Squares {
         (self.sum / self.count as f64).sqrt()
     }
 
-    /// Median over the windows of a window's own root mean square \[rad\].
+    /// Median over the windows of each window's root mean square \[rad\].
     pub fn median(&self) -> f64 {
         median(&self.windows)
     }

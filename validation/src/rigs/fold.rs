@@ -17,7 +17,7 @@ pub struct Measured {
     pub rig: Rig,
     /// Before any fit.
     pub declared: Model,
-    /// The declared model with the plain structure, before any fit.
+    /// The declared model with the plain structure added, before any fit.
     pub plain: Model,
     /// Published parameter sets by name.
     pub published: Vec<(String, Model)>,
@@ -32,14 +32,14 @@ pub struct Fold {
     pub name: String,
     pub train: Vec<Log>,
     pub test: Vec<Log>,
-    /// What each test log belongs to.
+    /// The row that each test log counts in.
     pub places: Vec<Place>,
 }
 
 /// A test log, and the row of the table that it counts in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// `None` for a log (or half of one) that was left out of those that models are fitted to.
+    /// `None` for a log (or half of one) that was left out of the logs that models are fitted to.
     pub group: Option<String>,
     pub log: String,
 }
@@ -121,7 +121,7 @@ fn with_plain(
 
 /// The logs of a rig.
 struct Logs {
-    /// Those that models are fitted to.
+    /// The logs that models are fitted to.
     fitted: Vec<Log>,
     also: BTreeMap<String, Vec<Log>>,
 }
@@ -191,7 +191,7 @@ impl Logs {
         ]
     }
 
-    /// The fold that tests on other logs, where there are any.
+    /// The fold that tests on other logs, if there are any.
     fn all(&self) -> Option<Fold> {
         let tests = self
             .also
@@ -226,7 +226,7 @@ fn fingerprint(rig: &Rig, data: &Path) -> String {
     let names = rig.logs.iter().chain(rig.also.values().flatten());
     let logs = names.map(|log| data.join(&rig.folder).join(log));
     for path in models.chain(logs) {
-        // A built-in system is no file; it changes with the program alone.
+        // A built-in system is not a file; it changes only with the program.
         bytes.extend(std::fs::read(path).unwrap_or_default());
     }
     content_id(&bytes)

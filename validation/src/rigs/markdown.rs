@@ -5,9 +5,9 @@ use std::fmt::Write;
 
 use super::table::{Entry, Row, Summary};
 
-/// Errors after up to this share of the best of the others are clearly better than it.
+/// Errors after closing the loop that are at most this share of the best other error are clearly better.
 const CLEARLY: f64 = 0.9;
-/// A network may raise the error after up to this factor.
+/// A network may raise the error after closing the loop by up to this factor.
 const NETWORK: f64 = 1.02;
 
 /// The summary as Markdown.
@@ -67,7 +67,7 @@ fn push_row(text: &mut String, row: &Row) {
     );
 }
 
-/// `31.2 (6.1)`; where folds failed, their number, since the rest is no error of all test logs.
+/// `31.2 (6.1)`; if folds failed, their number, since the rest is not an error over all test logs.
 fn cell(entry: &Entry) -> String {
     match (entry.failed, entry.error(), entry.middle()) {
         (0, Some(rms), Some(middle)) => {
@@ -119,13 +119,13 @@ fn totals(rows: &[Row]) -> String {
 fn listed(counts: &BTreeMap<String, usize>) -> String {
     let mut all: Vec<(&String, &usize)> = counts.iter().collect();
     all.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
-    let told: Vec<String> = all
+    let message: Vec<String> = all
         .into_iter()
         .map(|(what, count)| format!("{what} ({count})"))
         .collect();
-    if told.is_empty() {
+    if message.is_empty() {
         "nothing".to_owned()
     } else {
-        told.join(", ")
+        message.join(", ")
     }
 }

@@ -17,7 +17,7 @@ use residyn_core::closeloop::{
 use residyn_core::data::Log;
 use residyn_core::model::{Library, Model};
 
-/// What is scored.
+/// A model that is scored.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scored {
@@ -33,11 +33,11 @@ pub enum Scored {
     MujocoSysid,
     /// What closing the loop found.
     After,
-    /// With the residual network; where there is none, the same as after.
+    /// With the residual network; the same as `After` if there is none.
     Hybrid,
 }
 
-/// A piece of work in a fold. Each is stored by itself.
+/// A piece of work in a fold. Each is stored separately.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
@@ -51,12 +51,12 @@ pub enum Method {
     CloseLoop,
 }
 
-/// What a method gave in a fold.
+/// The result of a method in a fold.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Found {
-    /// Of each model on each test log of the fold.
+    /// Errors of each model on each test log of the fold.
     pub errors: Vec<(Scored, Vec<LogErrors>)>,
-    /// What closing the loop said.
+    /// The verdict of closing the loop.
     pub said: Option<Said>,
 }
 
@@ -88,7 +88,7 @@ impl Scored {
     }
 }
 
-/// What methods work with.
+/// The tools that methods work with.
 pub struct Tools<'a> {
     pub library: &'a Library,
     /// Trains the residual network.
@@ -104,7 +104,7 @@ impl Method {
         Self::CloseLoop,
     ];
 
-    /// As its files are called.
+    /// The name used in its files.
     pub fn name(self) -> &'static str {
         match self {
             Self::AsTheyAre => "as_they_are",
@@ -114,7 +114,7 @@ impl Method {
         }
     }
 
-    /// What the method scores on a rig.
+    /// The models that the method scores on a rig.
     pub fn scores(self, rig: &Measured) -> Vec<Scored> {
         let published = rig
             .published
@@ -131,7 +131,7 @@ impl Method {
     /// Changes with everything that the result depends on; `program` stands for this build of the program.
     pub fn fingerprint(self, rig: &Measured, fold: &Fold, seed: u64, program: &str) -> String {
         match self {
-            // Another build of the program changes nothing in what MuJoCo is given.
+            // Another build of the program changes nothing in the task for MuJoCo.
             Self::MujocoSysid => Task::new(&rig.declared, &fold.train, &fold.test)
                 .map_or_else(|error| error.to_string(), |task| task.fingerprint()),
             Self::AsTheyAre | Self::Plain | Self::CloseLoop => {
@@ -179,7 +179,7 @@ fn as_they_are(rig: &Measured, fold: &Fold) -> Vec<(Scored, Vec<LogErrors>)> {
         .collect()
 }
 
-/// A model with its effects fitted from the values that it has, as closing the loop fits the declared model.
+/// A model and its effects, fitted from their current values, as closing the loop fits the declared model.
 fn fit(model: &Model, library: &Library, logs: &[Log]) -> Result<Model, StudyError> {
     let settings = Settings::default();
     let problem = Problem::new(model, library, logs, &settings);

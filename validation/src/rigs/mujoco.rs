@@ -1,5 +1,5 @@
 //! What mujoco.sysid, the identification toolbox of MuJoCo, makes of a fold: it fits the exported model with the structure
-//! that it is told, and MuJoCo simulates the windows of the test logs, which are scored here.
+//! that it is given, and MuJoCo simulates the windows of the test logs, which are scored here.
 
 use std::path::Path;
 
@@ -19,7 +19,7 @@ const CLIENT: PythonClient = PythonClient {
     script: include_str!("mujoco_sysid.py"),
     packages: "'mujoco[sysid]>=4'",
 };
-/// Training logs are cut into pieces of this length, each with a start state of its own \[s\]: the longest horizon of the
+/// Training logs are cut into pieces of this length \[s\], each with its own start state: the longest horizon of the
 /// scores.
 const PIECE_S: f64 = 1.0;
 
@@ -39,7 +39,7 @@ struct Recorded<'a> {
     windows: Vec<Vec<Start>>,
 }
 
-/// Rows of a window, and angles and velocities at its first.
+/// Rows of a window, and angles and velocities at its first row.
 #[derive(Debug, Serialize)]
 struct Start {
     first: usize,
@@ -53,10 +53,10 @@ struct Reply {
     predicted: Vec<Vec<Vec<Vec<Vec<f64>>>>>,
 }
 
-/// A prediction of MuJoCo that is as far off as this has diverged \[rad\], as in the script.
+/// A MuJoCo prediction that reaches this angle has diverged \[rad\], as in the script.
 const SENSIBLE: f64 = 1e4;
 
-/// What the toolbox is given.
+/// The input of the toolbox.
 pub struct Task<'a> {
     /// The declared model in MuJoCo's format.
     mjcf: Vec<u8>,
@@ -64,7 +64,7 @@ pub struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    /// Fit `model` to the training logs; without any it is simulated as it is.
+    /// Fit `model` to the training logs; without training logs it is simulated as it is.
     ///
     /// # Errors
     /// A model that MuJoCo's format cannot carry.
@@ -90,7 +90,7 @@ impl<'a> Task<'a> {
         })
     }
 
-    /// Changes with everything that the result depends on, but for the versions of the Python packages.
+    /// Changes with everything that the result depends on, except the versions of the Python packages.
     pub fn fingerprint(&self) -> String {
         let mut bytes = serde_json::to_vec(&self.question).expect("logs are finite numbers");
         bytes.extend(&self.mjcf);

@@ -3,11 +3,11 @@
 use super::table::{Entry, Row, Summary};
 use residyn_report::plot::{Bar, ErrorRow, JointKind, PlotError, Role, error_bars};
 
-/// Models that have no colour of their own elsewhere, in the order of their colours; published sets follow.
+/// Models without a colour of their own elsewhere, in the order of their colours; published sets follow.
 const OTHERS: [&str; 2] = ["plain structure", "mujoco.sysid"];
 
-/// A bar for each model that was fitted or published, rig by rig, as SVG text; none where no error is known. The declared model as
-/// written may be a guess, beside which no other bar could be read.
+/// A bar for each model that was fitted or published, rig by rig, as SVG text; none if no error is known. The declared
+/// model as written is left out: it may be a guess, next to which no other bar could be read.
 ///
 /// # Errors
 /// None for a summary.

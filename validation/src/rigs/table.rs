@@ -10,13 +10,13 @@ use super::method::{Found, Method, Said, Scored};
 use residyn_core::closeloop::{Settings, Verdict};
 use residyn_core::data::statistics::median;
 
-/// What a method gave in a fold, with its time.
+/// The result of a method in a fold, with its run time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     pub rig: String,
     pub fold: String,
     pub method: Method,
-    /// Of what the numbers depend on: see [`Method::fingerprint`].
+    /// Fingerprint of everything that the numbers depend on: see [`Method::fingerprint`].
     pub fingerprint: String,
     pub seconds: f64,
     /// An error counts as a failure wherever the method counts.
@@ -28,14 +28,14 @@ pub struct Line {
 pub struct Row {
     pub rig: String,
     pub group: Option<String>,
-    /// Number of fits that the row's test logs were scored by.
+    /// Number of fits that were scored on the row's test logs.
     pub folds: usize,
     pub models: Vec<Entry>,
-    /// Least error of the others (plain structure, published sets, mujoco.sysid), and whose it is.
+    /// The best of the other models (plain structure, published sets, mujoco.sysid), and its error.
     pub best: Option<(String, f64)>,
-    /// Error after over that.
+    /// Error after closing the loop, divided by the best other error.
     pub ratio: Option<f64>,
-    /// Error with the residual network over the error after.
+    /// Error with the residual network, divided by the error after closing the loop.
     pub hybrid_ratio: Option<f64>,
     /// Effects and verdicts, each with the number of folds.
     pub named: BTreeMap<String, usize>,
@@ -48,7 +48,7 @@ pub struct Row {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Entry {
     pub model: String,
-    /// Number of folds in which there is no such model, since its fit failed.
+    /// Number of folds without this model, since its fit failed.
     pub failed: usize,
     /// Number of folds in which the method was not run.
     pub missing: usize,
@@ -64,7 +64,7 @@ pub struct Horizon {
     pub horizon_s: f64,
     /// Root mean square over all rows of all windows and all joints \[rad\]; null without a window.
     pub position_rms: f64,
-    /// Median over the windows of a window's own root mean square \[rad\].
+    /// Median over the windows of each window's root mean square \[rad\].
     pub position_median: f64,
     pub windows: usize,
     pub diverged: usize,
@@ -239,7 +239,7 @@ impl Line {
 }
 
 impl Entry {
-    /// The error of the table, where there is one of every fold \[rad\].
+    /// The error in the table \[rad\], if every fold has one.
     pub fn error(&self) -> Option<f64> {
         let middle = self.middle()?;
         (self.failed + self.missing == 0 && middle.windows > 0).then_some(middle.position_rms)
@@ -251,7 +251,7 @@ impl Entry {
     }
 }
 
-/// The least error of those that closing the loop has to match, and whose it is.
+/// The best of the models that closing the loop has to match, and its error.
 fn best(models: &[(Scored, Entry)]) -> Option<(String, f64)> {
     let rivals = models.iter().filter(|(what, _)| what.is_rival());
     rivals

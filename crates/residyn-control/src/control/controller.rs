@@ -9,12 +9,12 @@ use residyn_core::sim::batch::Block;
 
 /// Decides the torque of each step.
 pub trait Policy {
-    /// The torque (N m or N, one a joint) to hold from `time_s` on, given the sensor readings `measured` (positions, then
-    /// velocities).
+    /// The torque (N m or N, one per joint) to hold from `time_s` on, given the sensor readings `measured` (positions,
+    /// then velocities).
     fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64>;
 }
 
-/// A plan of which no candidate has a finite return.
+/// A plan in which no candidate has a finite return.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
     "no candidate of the plan at {time_s:.3} s has a finite return: the model leaves the finite numbers in all of them; mend \
@@ -64,7 +64,7 @@ impl<'p, 'r> Controller<'p, 'r> {
         self.diverged
     }
 
-    /// When plans were made of which no candidate had a finite return \[s\]: the model left the finite numbers in all of them.
+    /// Times of plans in which no candidate had a finite return \[s\]: the model diverged in all of them.
     pub fn lost(&self) -> &[f64] {
         &self.lost
     }
@@ -72,7 +72,7 @@ impl<'p, 'r> Controller<'p, 'r> {
     /// Whether all plans had a candidate with a finite return.
     ///
     /// # Errors
-    /// The first that had none.
+    /// The first plan that had none.
     pub fn check(&self) -> Result<(), LostPlan> {
         let lost = self.lost.first().map(|&time_s| LostPlan { time_s });
         lost.map_or(Ok(()), Err)

@@ -6,10 +6,10 @@ use crate::plan::Objective;
 use residyn_core::data::Log;
 use residyn_core::plant::{PlantError, Rig};
 
-/// A stretch of steps of a rig under a policy.
+/// Consecutive steps of a rig under a policy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
-    /// Sensor readings and commands: one row a step, and one for the state after the last step.
+    /// Sensor readings and commands: one row per step, and one for the state after the last step.
     pub log: Log,
     /// The true state of each row: positions, then velocities.
     pub states: Vec<Vec<f64>>,
@@ -19,7 +19,7 @@ pub struct Stretch {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Episode {
     pub stretch: Stretch,
-    /// Of each step.
+    /// The reward of each step.
     pub rewards: Vec<f64>,
     /// Whether the goal held to the end.
     pub success: bool,
@@ -70,7 +70,7 @@ pub fn drive(
 /// A whole episode of `task` from the rig's current state.
 ///
 /// # Errors
-/// A rig that diverges, and a reward or goal that is no finite number.
+/// A rig that diverges, and a reward or goal that is not finite.
 pub fn episode(
     task: &Task,
     rig: &mut Rig<'_>,

@@ -19,7 +19,7 @@ impl Predictor {
     }
 
     /// Equations and the networks whose outputs are added to their derivative; `integrator` is the one that the model
-    /// was trained through.
+    /// was trained with.
     pub fn new(equations: Dynamics, networks: Vec<MlpWeights>, integrator: Integrator) -> Self {
         Self {
             equations,
@@ -41,7 +41,7 @@ impl Predictor {
     /// Rollouts of the model under this objective, in steps of `step_s` seconds.
     ///
     /// # Panics
-    /// When the objective is of another number of joints.
+    /// When the objective has a different number of joints.
     pub fn rollouts(&self, objective: &Objective, step_s: f64) -> Rollouts {
         let Self {
             equations,

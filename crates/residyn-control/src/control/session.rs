@@ -3,11 +3,11 @@ use rand_chacha::ChaCha8Rng;
 use super::{Controller, Predictor, Task};
 use crate::plan::Planner;
 
-/// Run `lead` with a controller that plans with `predictor` for `task`, anew after `replan` steps, on all cores. `rng`
-/// draws the candidates.
+/// Run `lead` with a controller that plans with `predictor` for `task`, replanning after `replan` steps, on all cores.
+/// `rng` draws the candidates.
 ///
 /// # Panics
-/// When `predictor` has another number of joints than the task.
+/// When `predictor` has a different number of joints from the task.
 pub fn with_controller<R>(
     predictor: &Predictor,
     task: &Task,

@@ -28,7 +28,7 @@ pub struct Task {
     pub step_s: f64,
     /// True positions, then velocities at the start.
     pub start: Vec<f64>,
-    /// Half the width of a uniform distribution around each of them; none where not given.
+    /// Half the width of a uniform distribution around each of them; none if not given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub start_spread: Vec<f64>,
     /// Lowest and highest torque of each joint, in N m (or N), or command of its drive.
@@ -97,7 +97,7 @@ pub enum NoTask {
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../configs/tasks");
 
 impl Task {
-    /// Read a task file or, where there is no such file, the embedded task of that name.
+    /// Read a task file or, if there is no such file, the embedded task of that name.
     ///
     /// # Errors
     /// Unreadable file, unknown key, invalid formula or number: with place and remedy.
@@ -135,7 +135,7 @@ impl Task {
         names
     }
 
-    /// The embedded task of a system; of several, the one with the longest planning horizon.
+    /// The embedded task of a system; if there are several, the one with the longest planning horizon.
     pub fn of_system(system: &str) -> Option<Self> {
         let tasks = Self::names()
             .into_iter()
@@ -146,10 +146,11 @@ impl Task {
             .max_by_key(|task| task.planner.horizon)
     }
 
-    /// A task for a plant: of a file, or the embedded one of this name; without a name, that of the plant's system.
+    /// A task for a plant: from a file, or the embedded one of this name; without a name, the task of the plant's
+    /// system.
     ///
     /// # Errors
-    /// As [`Task::read`]; no task of the plant's system, or one of another.
+    /// As [`Task::read`]; no task for the plant's system, or a task for another system.
     pub fn for_plant(plant: &Plant, given: Option<&Path>) -> Result<Self, NoTask> {
         let system = &plant.system.name;
         let of_system = || {
@@ -169,7 +170,7 @@ impl Task {
         }
     }
 
-    /// Its name: that of its file.
+    /// Its name: the stem of its file's name.
     pub fn name(&self) -> String {
         let stem = self.path.file_stem().unwrap_or_default();
         stem.to_string_lossy().into_owned()
@@ -206,7 +207,7 @@ impl Task {
     /// [own](Plant::dynamics).
     ///
     /// # Panics
-    /// When one of them is of another system.
+    /// When one of them belongs to another system.
     pub fn rig<'d>(&self, plant: &Plant, dynamics: &'d Dynamics, start: &[f64]) -> Rig<'d> {
         let PlantSettings { integrator, noise } = self.plant;
         let start = plant.as_read(start);
@@ -318,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_with_their_remedy() {
+    fn mistakes_are_reported_with_their_remedy() {
         let text = super::text_of("pendulum").unwrap();
         let message = |from: &str, to: &str| {
             assert!(text.contains(from), "{from}");

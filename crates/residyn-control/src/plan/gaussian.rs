@@ -9,7 +9,7 @@ use residyn_core::sim::batch::{Rows, W};
 const UNIT: f32 = 1.0 / (1 << 24) as f32;
 
 /// Standard normal numbers by the method of Box and Muller (1958): two rows from two rows of uniform numbers. With 24
-/// bits none exceeds 5.8 standard deviations.
+/// bits no number exceeds 5.8 standard deviations.
 #[derive(Debug, Clone)]
 pub struct Gaussian {
     bits: Vec<u32>,
@@ -46,7 +46,7 @@ impl WithSimd for Transform<'_> {
         for (pair, bits) in self.rows.chunks_mut(2).zip(self.bits.chunks_exact(2 * W)) {
             let (mut share, mut angle) = (Rows::splat(0.0), Rows::splat(0.0));
             for lane in 0..W {
-                // Never zero: the logarithm follows.
+                // Never zero, since its logarithm is taken.
                 share[lane] = ((bits[lane] >> 8) + 1) as f32 * UNIT;
                 angle[lane] = (bits[W + lane] >> 8) as f32 * (TAU * UNIT);
             }

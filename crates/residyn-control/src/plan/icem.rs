@@ -17,11 +17,11 @@ use super::proposal::Proposal;
 pub struct Icem {
     /// Number of best candidates to which the distributions are fitted.
     pub elite: usize,
-    /// beta: the power of the noise falls with the frequency f as f^-beta. 0 is white noise; published are 0.25 to
-    /// 3.5, the higher the slower the motion that is wanted.
+    /// beta: the power of the noise falls with the frequency f as f^-beta. 0 is white noise; published values are 0.25
+    /// to 3.5, the higher the slower the desired motion.
     #[serde(default = "noise_exponent")]
     pub noise_exponent: f64,
-    /// The share of the elite that is kept; at least the best.
+    /// The share of the elite that is kept; at least the best candidate.
     #[serde(default = "keep")]
     pub keep: f64,
     /// alpha: the share of the old mean and standard deviation in the new.

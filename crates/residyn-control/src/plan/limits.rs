@@ -9,14 +9,14 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("`{key}` is {value}; it must be {remedy}")]
 pub struct SettingsError {
-    /// As files call it.
+    /// Its name in files.
     pub key: &'static str,
     pub value: String,
     /// What it may be.
     pub remedy: String,
 }
 
-/// Refuse an elite that is none of the population.
+/// Refuse an elite that is empty or larger than the population.
 pub(super) fn check_elite(elite: usize, population: usize) -> Result<(), SettingsError> {
     let remedy = format!("a whole number from 1 to {population}, the population");
     within("elite", elite, 1..=population, &remedy)

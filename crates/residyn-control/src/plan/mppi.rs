@@ -5,8 +5,8 @@ use super::method::Search;
 use super::population::Population;
 use super::proposal::Proposal;
 
-/// Model-predictive path-integral control (Williams et al. 2017): the next mean is that of all candidates, each with
-/// the weight exp((return - best) / scale). The standard deviation stays. The mean is the plan.
+/// Model-predictive path-integral control (Williams et al. 2017): the next mean is the mean of all candidates with
+/// weights exp((return - best) / scale). The standard deviation stays fixed. The mean is the plan.
 ///
 /// A temperature in units of return would have to be tuned for every objective, rig and horizon. Here it is a share
 /// of the spread of the population's returns, from the best to the median: scaling or shifting the objective gives
@@ -14,7 +14,7 @@ use super::proposal::Proposal;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mppi {
-    /// How much worse than the best a candidate is whose weight is 1/e of the best one's, as a share of the spread.
+    /// How much worse than the best a candidate with 1/e of its weight is, as a share of the spread.
     pub temperature: f64,
     /// Standard deviation of the candidates, as a share of half an input's range.
     pub deviation: f64,
@@ -47,7 +47,7 @@ impl Search for Mppi {
 
     fn learn(&self, population: &Population<'_>, proposal: &mut Proposal) {
         let (best, median) = (population.best(), population.median());
-        // All alike where there is no spread: then zero over anything is zero.
+        // Without a spread all weights are equal: zero over anything is zero.
         let scale = (self.temperature as f32 * (best - median)).max(f32::MIN_POSITIVE);
         proposal.average(population, |value| ((value - best) / scale).exp());
     }

@@ -19,8 +19,8 @@ pub trait Evaluate: Send {
     /// Prepare a plan of `steps` steps from `start`.
     fn prepare(&self, start: Self::Start, steps: usize) -> Self::Prepared;
 
-    /// The return of each candidate of a block from `start` under `inputs` (`[step * n + input]`); NaN or infinite
-    /// where the rollout diverges.
+    /// The return of each candidate of a block from `start` under `inputs` (`[step * n + input]`); NaN or infinite if
+    /// the rollout diverges.
     fn returns(&mut self, start: &Self::Prepared, inputs: &[Rows], returns: &mut Rows);
 }
 
@@ -29,8 +29,8 @@ pub trait Evaluate: Send {
 ///
 /// Plan repeatedly within [`Planner::with_workers`] to use all cores.
 ///
-/// Candidates are clipped to the bounds before they are evaluated. The result is the same on any
-/// number of processor cores: each block of candidates has a random stream of its own.
+/// Candidates are clipped to the bounds before they are evaluated. The result is the same on any number of processor
+/// cores: each block of candidates has its own random stream.
 pub struct Planner<E: Evaluate> {
     settings: Settings,
     // Locks, since the workers share all of it with the calling thread. They are never contended.
@@ -56,7 +56,7 @@ struct Candidates<E> {
 pub struct Plan {
     /// `[step][input]`
     pub inputs: Vec<Vec<f64>>,
-    /// The best return of a candidate in the last iteration; minus infinity where all of them diverged.
+    /// The best return of a candidate in the last iteration; minus infinity if all of them diverged.
     pub best: f64,
     /// Number of candidates, over all iterations, whose return was not finite; they rank last.
     pub diverged: usize,
@@ -109,7 +109,7 @@ impl<E: Evaluate> Planner<E> {
         }
     }
 
-    /// Call `body` with all cores available to the searches in it. Outside of it a search runs on one core.
+    /// Call `body` with all cores available to the searches in it. Outside it a search runs on one core.
     pub fn with_workers<R>(&self, body: impl FnOnce() -> R) -> R {
         self.pool
             .with_workers(&|index| self.draw_and_evaluate(index), body)

@@ -2,7 +2,7 @@ use residyn_core::sim::batch::{Rows, W};
 
 /// The candidates of one iteration and their returns.
 pub struct Population<'a> {
-    /// Of each block of candidates, `[step * n + input]`.
+    /// Inputs of each block of candidates, `[step * n + input]`.
     inputs: Vec<&'a [Rows]>,
     /// Finite returns with the indices of their candidates, in order.
     known: Vec<(f32, usize)>,
@@ -26,13 +26,13 @@ impl<'a> Population<'a> {
         self.size - self.known.len()
     }
 
-    /// The best return, minus infinity where all diverged.
+    /// The best return, minus infinity if all diverged.
     pub fn best(&self) -> f32 {
         let values = self.known.iter().map(|(value, _)| *value);
         values.fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// The median of the finite returns, the upper of two; minus infinity where there are none.
+    /// The median of the finite returns, the upper of two; minus infinity if there are none.
     pub fn median(&self) -> f32 {
         self.elite(self.known.len().div_ceil(2))
             .last()
@@ -63,7 +63,7 @@ impl<'a> Population<'a> {
         rows.map(|row| row[candidate % W]).collect()
     }
 
-    /// The mean sequence of all candidates that did not diverge, weighted by `weight(return)`. None where all diverged.
+    /// The mean sequence of all candidates that did not diverge, weighted by `weight(return)`. `None` if all diverged.
     pub fn mean(&self, weight: impl Fn(f32) -> f32) -> Option<Vec<f32>> {
         let mut weights = vec![Rows::splat(0.0); self.inputs.len()];
         for (value, candidate) in &self.known {

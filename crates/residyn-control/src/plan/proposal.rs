@@ -64,7 +64,7 @@ impl Proposal {
         }
     }
 
-    /// Fit mean and standard deviation to the elite; `momentum` is the share of the old values. Unchanged where all
+    /// Fit mean and standard deviation to the elite; `momentum` is the share of the old values. Unchanged if all
     /// candidates diverged.
     pub fn fit(&mut self, population: &Population<'_>, elite: &[(f32, usize)], momentum: f32) {
         self.first = false;
@@ -88,7 +88,7 @@ impl Proposal {
         }
     }
 
-    /// Set the mean to the weighted mean of all candidates. Unchanged where all diverged.
+    /// Set the mean to the weighted mean of all candidates. Unchanged if all diverged.
     pub fn average(&mut self, population: &Population<'_>, weight: impl Fn(f32) -> f32) {
         self.first = false;
         if let Some(mean) = population.mean(weight) {

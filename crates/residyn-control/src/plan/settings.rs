@@ -5,7 +5,7 @@ use super::method::Search;
 use super::{Cem, Icem, Mppi};
 use residyn_core::limits::{CANDIDATES, HORIZON, ITERATIONS};
 
-/// How a planner searches. In a file all of it is one table:
+/// How a planner searches. In a file this is one table:
 ///
 /// ```toml
 /// method = "cem"
@@ -25,7 +25,7 @@ pub struct Settings {
     pub method: Method,
 }
 
-/// How the next candidates come from the last.
+/// How the next candidates follow from the last.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "method", rename_all = "snake_case")]
 pub enum Method {
@@ -35,7 +35,7 @@ pub enum Method {
 }
 
 impl Settings {
-    /// Refuse what no search can run with.
+    /// Refuse settings with which no search can run.
     ///
     /// # Errors
     /// One sentence that names the key, its value and what it may be.
@@ -51,8 +51,8 @@ impl Method {
     /// The names that files and the command line know.
     pub const NAMES: [&str; 3] = ["cem", "icem", "mppi"];
 
-    /// A method with its usual settings; methods that have an elite take the share that is published for the
-    /// cross-entropy method here, 20 of 300.
+    /// A method with its usual settings; methods that have an elite take the share published here for the cross-entropy
+    /// method, 20 of 300.
     pub fn usual(name: &str, population: usize) -> Option<Self> {
         let elite = (population / 15).max(1);
         match name {

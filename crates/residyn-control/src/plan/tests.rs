@@ -20,7 +20,7 @@ fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-/// The closer every input is to a goal the better; beyond 2 nobody knows.
+/// The closer every input is to a goal, the better; from 2 on the return is unknown.
 struct Near;
 
 impl Evaluate for Near {
@@ -64,7 +64,7 @@ fn near(settings: &Settings, bounds: &[[f64; 2]], seed: u64) -> Planner<Near> {
     Planner::new(settings, bounds, || Near, &rng(seed))
 }
 
-/// How far a plan is from the goal at most.
+/// The largest distance of a plan's inputs from the goal.
 fn off(plan: &Plan, goal: f64) -> f64 {
     let off = plan.inputs.iter().flatten().map(|x| (x - goal).abs());
     off.fold(0.0, f64::max)
@@ -121,7 +121,7 @@ fn inputs_stay_within_their_bounds() {
 #[test]
 fn diverging_candidates_rank_last() {
     for settings in all() {
-        // The best known sequences border on those that nobody knows.
+        // The best known sequences border on those with unknown returns.
         let plan = near(&settings, &[[-3.0, 3.0]], 3).plan(2.5);
         let inputs = || plan.inputs.iter().flatten();
         assert!(

@@ -18,12 +18,12 @@ pub struct OfLog {
     pub log: String,
     /// With 95 % intervals.
     pub fitted: Result<Fitted, FitError>,
-    /// The error that is compared, on each training log in their order; empty where it was not fitted or the logs are many.
+    /// The compared error on each training log, in order; empty if the fit failed or there are too many logs.
     pub errors: Vec<f64>,
 }
 
 impl Problem<'_> {
-    /// The chosen model by log; nothing for a single log.
+    /// The chosen model fitted log by log; empty for a single log.
     pub(super) fn by_log(&self, chosen: &Fitted, watch: &dyn Watch) -> Vec<OfLog> {
         let most = self.settings.score.most_logs_fitted_alone;
         if !(2..=most).contains(&self.logs.len()) || watch.has_to_end() {
@@ -47,8 +47,8 @@ impl Problem<'_> {
             held: self.identifiability.hold.clone(),
             ..self.on(from_ref(log))
         };
-        let locals = problem.shooting.initial_locals(0);
-        let mut fitted = problem.refit(&chosen.model, locals, None)?;
+        let start_states = problem.shooting.initial_start_states(0);
+        let mut fitted = problem.refit(&chosen.model, start_states, None)?;
         let uncertainty = uncertainty(&problem.shooting, &fitted.fit);
         fitted.model = with_intervals(&problem, &fitted, &uncertainty, &fitted.model);
         Ok(fitted)
@@ -65,7 +65,7 @@ impl Problem<'_> {
                 test: from_ref(log),
                 settings: &self.settings.score,
             };
-            scorer.compared(self.space, fitted)
+            scorer.compared(self.error_model, fitted)
         };
         logs.iter().map(error).collect()
     }

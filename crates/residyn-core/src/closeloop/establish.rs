@@ -18,7 +18,7 @@ use crate::model::{FittedEffect, Status};
 pub struct Standing {
     pub effect: FittedEffect,
     pub status: Status,
-    /// Fall of the loss on left-out stretches by this effect beside the others, as a share.
+    /// Relative fall of the loss on left-out blocks due to this effect, given the others.
     pub gain: f64,
     /// Probability of such evidence without the effect.
     pub p_value: f64,
@@ -35,7 +35,7 @@ pub struct Chosen {
     /// One for each added effect, in the order of the model.
     pub standings: Vec<Standing>,
     pub rounds: Vec<Round>,
-    /// Whether the search was stopped because its time was spent.
+    /// Whether the search was stopped because its time ran out.
     pub stopped: bool,
     /// Effects that explain the logs as well as one that was chosen.
     pub rivals: Vec<Rival>,
@@ -53,8 +53,8 @@ impl Chosen {
     }
 }
 
-/// Judge each effect of the set that was selected, and look for others that explain the logs as well. `before` is the declared model,
-/// which stays alone where no set could be fitted.
+/// Judge each effect of the selected set, and look for others that explain the logs as well. `before` is the declared
+/// model, which is kept without effects if no set could be fitted.
 pub fn establish(
     problem: &Problem<'_>,
     before: &Fitted,
@@ -101,8 +101,8 @@ pub fn establish(
     }
 }
 
-/// Judge each effect that a model has beyond the declared ones by the model refitted without it, `without`; where that
-/// failed, the model needs the effect. `trials` is the number of candidates, at all their starting points.
+/// Judge each effect that a model has beyond the declared ones against the model refitted without it, `without`; if
+/// that refit failed, the model needs the effect. `trials` is the number of candidates at all their starting points.
 pub(super) fn standings(
     problem: &Problem<'_>,
     chosen: &Trial,
@@ -166,23 +166,23 @@ pub(super) fn without_each(problem: &Problem<'_>, chosen: &Trial) -> Vec<Result<
         .collect()
 }
 
-/// What speaks for one effect beside the others.
+/// The evidence for one effect, given the others.
 struct Evidence {
     gain: f64,
     /// By the cluster-robust Wald test; `None` for an effect that no value switches off.
     p_of_values: Option<f64>,
-    /// By the falls of the loss, each half of the stretches judged with the values that fit the other.
+    /// By the falls of the loss, each half of the blocks judged with values fitted to the other half.
     p_of_falls: f64,
     crossed_gain: f64,
 }
 
 impl Evidence {
-    /// The p-value of the values, or of the falls where there is none.
+    /// The p-value of the values, or of the falls if there is none.
     fn p_alone(&self) -> f64 {
         self.p_of_values.unwrap_or(self.p_of_falls)
     }
 
-    /// The p-value of the values or, where they say little, the smaller one.
+    /// The p-value of the values or, if it is not significant, the smaller of the two.
     fn p(&self, settings: &EstablishSettings) -> f64 {
         let alone = self.p_alone();
         match alone < settings.uncorrected_false_alarm {
@@ -210,19 +210,19 @@ impl Evidence {
             || self.crossed_gain >= settings.plain_gain;
         (!confirmed).then(|| {
             format!(
-                "with values fitted to one half of the stretches it changes the loss on the other by {:.0} % (p = {:.2})",
+                "with values fitted to one half of the blocks it changes the loss on the other by {:.0} % (p = {:.2})",
                 -100.0 * self.crossed_gain, self.p_of_falls
             )
         })
     }
 }
 
-/// That an effect changes the loss on left-out stretches by too little; a negative gain is a rise.
+/// Says that an effect changes the loss on left-out blocks by too little; a negative gain is a rise.
 fn too_small(gain: f64) -> String {
     let percent = 100.0 * gain.abs();
     match gain < 0.0 {
-        true => format!("it raises the loss on left-out stretches by {percent:.1} %"),
-        false => format!("it lowers the loss on left-out stretches by {percent:.1} % only"),
+        true => format!("it raises the loss on left-out blocks by {percent:.1} %"),
+        false => format!("it lowers the loss on left-out blocks by {percent:.1} % only"),
     }
 }
 
@@ -232,9 +232,9 @@ mod tests {
 
     #[test]
     fn a_loss_that_rises_is_said_to_rise() {
-        let raises = "it raises the loss on left-out stretches by 2.3 %";
+        let raises = "it raises the loss on left-out blocks by 2.3 %";
         assert_eq!(too_small(-0.0234), raises);
-        let lowers = "it lowers the loss on left-out stretches by 0.4 % only";
+        let lowers = "it lowers the loss on left-out blocks by 0.4 % only";
         assert_eq!(too_small(0.0041), lowers);
         assert_eq!(too_small(0.0), lowers.replace("0.4", "0.0"));
     }

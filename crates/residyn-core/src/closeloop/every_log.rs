@@ -19,8 +19,8 @@ impl<'l> EveryLog<'l> {
         }
     }
 
-    /// The first log whose torques, on the joints of an effect, the model does not fit better than the one without the effect.
-    /// Neither is fitted here.
+    /// The first log whose torques, on the joints of an effect, the model fits no better than the model without the
+    /// effect. Neither is fitted here.
     pub fn fits_as_well_without(&self, standing: &Standing) -> Option<&'l Log> {
         let without = standing.without.as_ref().ok()?;
         let joints = standing.effect.joints();

@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use super::error::StudyError;
+use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::prepare::Prepared;
 use super::problem::Problem;
-use super::select::usual_friction;
-use super::space::Space;
+use super::select::baseline_friction;
 use super::stage::{Stage, Watch};
 use super::start::around;
 use crate::identify::{
@@ -20,8 +20,8 @@ use crate::model::{FittedEffect, Library, Model};
 /// The declared model, fitted.
 #[derive(Clone)]
 pub struct Declared<'a> {
-    /// What was to be explained, and what the fit tells of it: the width of friction's reversal, the noise of torques, and what the
-    /// logs determine.
+    /// The problem to explain, with what the fit adds: the smoothing velocities, the torque noise, and what the logs
+    /// determine.
     pub problem: Problem<'a>,
     pub fitted: Fitted,
 }
@@ -29,23 +29,23 @@ pub struct Declared<'a> {
 /// The declared model, fitted to its motion, and what the logs determine of it.
 type ByMotion = (Fitted, Identifiability);
 
-/// Nothing can be found in it.
+/// An empty library, in which nothing can be found.
 pub(super) static NOTHING: LazyLock<Library> = LazyLock::new(Library::empty);
 
 fn cost((fitted, _): &ByMotion) -> f64 {
     fitted.loss()
 }
 
-/// Choose the errors that say more about the logs, unless they are given, and fit the declared model by them. Where no joint moves,
-/// anything could be found, and no effect is looked for.
+/// Choose the errors that say more about the logs, unless they are given, and fit the declared model by them. If no
+/// joint moves, anything could be found, so no effect is looked for.
 ///
 /// # Errors
 /// Test logs without a window to score, torques that cannot be compared, and as [`Problem::fit_declared`].
 pub fn fit<'a>(prepared: &'a Prepared<'_>, watch: &dyn Watch) -> Result<Declared<'a>, StudyError> {
     prepared.check()?;
-    let mut problem = prepared.problem(prepared.space.unwrap_or(Space::Motion));
-    if prepared.space.is_none() && problem.is_prescribed() {
-        problem = prepared.problem(Space::Torque);
+    let mut problem = prepared.problem(prepared.error_model.unwrap_or(ErrorModel::OutputError));
+    if prepared.error_model.is_none() && problem.is_prescribed() {
+        problem = prepared.problem(ErrorModel::InverseDynamics);
     }
     if !problem.moves() {
         problem.library = &NOTHING;
@@ -55,17 +55,17 @@ pub fn fit<'a>(prepared: &'a Prepared<'_>, watch: &dyn Watch) -> Result<Declared
 }
 
 impl<'a> Problem<'a> {
-    /// Fit the declared model, with the effects that its file carries, from its declared values: over short
-    /// windows, in which even a poor start does not diverge, then over longer ones. It is fitted twice: alone, and with
-    /// the friction that most machines have on every joint until the last fit, since without friction the first optimum
-    /// of a rig that has it may lie anywhere. The better of the two counts. Parameters that the logs do not determine stay
-    /// near the declared values. A model that diverges with its declared values is fitted from others around them.
+    /// Fit the declared model, with the effects that its file carries, from its declared values: over short windows, in
+    /// which even a poor start does not diverge, then over longer ones. It is fitted twice: alone, and with baseline
+    /// friction on every joint until the last fit, since without friction the first optimum for a rig that has it may
+    /// lie anywhere. The better of the two counts. Parameters that the logs do not determine stay near the declared
+    /// values. A model that diverges with its declared values is fitted from other values around them.
     ///
     /// # Errors
     /// No window, or a model that diverges even over short windows, from all starting values.
     pub fn fit_declared(&self) -> Result<Declared<'a>, StudyError> {
-        let friction = usual_friction(self);
-        if self.space == Space::Torque {
+        let friction = baseline_friction(self);
+        if self.error_model == ErrorModel::InverseDynamics {
             return Ok(self.fitted_by_torques(&friction)?);
         }
         let (moved_to, found) = match self.fitted_from(self.declared, &friction) {
@@ -87,14 +87,14 @@ impl<'a> Problem<'a> {
         Ok(Declared { problem, fitted })
     }
 
-    /// The declared model, fitted by torques, in which it is so nearly linear that no start is poor. What the usual friction
-    /// leaves beside it is the noise of each joint's torque.
+    /// The declared model, fitted to torques, in which it is so nearly linear that no start is poor. The residual of
+    /// the model with the usual friction is the noise of each joint's torque.
     fn fitted_by_torques(&self, friction: &[FittedEffect]) -> Result<Declared<'a>, FitError> {
         let own = &self.declared.effects;
         let model = self.declared.with_effects([own, friction].concat());
-        let problem = self.with_sign_widths(self.best_sign_widths(&model)?);
+        let problem = self.with_smoothing_velocities(self.best_smoothing_velocities(&model)?);
         let beside = fit_torques(&problem.smoothed(&model), self.declared, self.logs)?;
-        // The logs are smoothed there as they are to be here.
+        // The logs there are already smoothed as needed here.
         let windows = cut(self.logs, self.settings.fit.window_s);
         let problem = problem.over(beside.shooting.over(windows));
         let alone = beside.model.effects[..own.len()].to_vec();
@@ -104,11 +104,10 @@ impl<'a> Problem<'a> {
         Ok(Declared { problem, fitted })
     }
 
-    /// The speeds over which the friction of each joint reverses with which a model's torques fit best, unless the file gives
-    /// them.
-    fn best_sign_widths(&self, model: &Model) -> Result<Vec<f64>, FitError> {
-        let mut best = self.sign_widths.clone();
-        if self.declared.sign_width.is_some() {
+    /// The smoothing velocities with which a model's torques fit best, joint by joint, unless the file gives them.
+    fn best_smoothing_velocities(&self, model: &Model) -> Result<Vec<f64>, FitError> {
+        let mut best = self.smoothing_velocities.clone();
+        if self.declared.smoothing_velocity.is_some() {
             return Ok(best);
         }
         let fitted = |share: &f64| {
@@ -117,7 +116,7 @@ impl<'a> Problem<'a> {
                 .iter()
                 .map(|top| share * top.max(1e-6))
                 .collect();
-            let model = model.with_sign_widths(widths.clone());
+            let model = model.with_smoothing_velocities(widths.clone());
             let found = fit_torques(&model, self.declared, self.logs)?;
             Ok((found.shooting.noise, widths))
         };
@@ -141,7 +140,7 @@ impl<'a> Problem<'a> {
         Some((start, found))
     }
 
-    /// The declared model, fitted from these values alone and beside friction.
+    /// The declared model, fitted from these values, alone and together with friction.
     fn fitted_from(&self, start: &Model, friction: &[FittedEffect]) -> Result<ByMotion, FitError> {
         let found = self.declared_beside(start, &[]);
         if friction.is_empty() {
@@ -154,14 +153,15 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The declared model with the friction that most machines have on every joint, fitted from where the declared one began;
-    /// `None` where it diverges.
+    /// The declared model with baseline friction on every joint, fitted from the starting values of the declared one;
+    /// `None` if it diverges.
     pub(super) fn with_usual_friction(&self) -> Option<Fitted> {
-        let friction = usual_friction(self);
+        let friction = baseline_friction(self);
         self.fitted_beside(&self.started_from(), &friction).ok()
     }
 
-    /// The declared model with these effects, fitted from these values: over short windows, then over those of the problem.
+    /// The declared model with these effects, fitted from these values: over short windows, then over the problem's
+    /// windows.
     fn fitted_beside(&self, start: &Model, effects: &[FittedEffect]) -> Result<Fitted, FitError> {
         let short = self.windows_of(self.settings.fit.short_window_s);
         let own = &self.declared.effects;
@@ -170,8 +170,8 @@ impl<'a> Problem<'a> {
         self.fitted_over(&self.shooting, &first.model)
     }
 
-    /// The declared model, fitted from these values beside some effects and then alone, and what the logs determine of it
-    /// beside them.
+    /// The declared model, fitted from these values with some effects and then alone, and what the logs determine of it
+    /// together with them.
     fn declared_beside(
         &self,
         start: &Model,
@@ -187,8 +187,8 @@ impl<'a> Problem<'a> {
         Ok((alone, identifiability))
     }
 
-    /// The declared model, fitted over short windows alone, in which even a poor start does not diverge, from the values that its
-    /// fit began with.
+    /// The declared model, fitted over short windows only, in which even a poor start does not diverge, from the
+    /// starting values of its fit.
     ///
     /// # Errors
     /// As [`Problem::fit_declared`].
@@ -201,14 +201,20 @@ impl<'a> Problem<'a> {
 
     fn fitted_over(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fitted, FitError> {
         let model = self.smoothed(model);
-        let dynamics = self.space.compile(&model);
-        let locals = shooting.initial_locals(0);
-        let found = fit_windows(shooting, &dynamics, &self.active(&dynamics), locals, None)?;
+        let dynamics = self.error_model.compile(&model);
+        let start_states = shooting.initial_start_states(0);
+        let found = fit_windows(
+            shooting,
+            &dynamics,
+            &self.active(&dynamics),
+            start_states,
+            None,
+        )?;
         Ok(Fitted::new(&model, &dynamics, found, self.logs))
     }
 
-    /// What the logs determine of the declared parameters and of the effects that the file carries, beside all that a fitted
-    /// model has.
+    /// What the logs determine of the declared parameters and of the file's effects, together with all effects of a
+    /// fitted model.
     pub(super) fn identifiability_of(&self, fitted: &Fitted) -> Identifiability {
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
@@ -216,7 +222,7 @@ impl<'a> Problem<'a> {
         let bodies = self.declared.inertias().concat();
         let mut verdict = identifiability(&dynamics, self.readiness(), &values, &fitted.fit);
         let known = verdict.hold.len() + verdict.determined;
-        // Combinations that nothing tells and nothing holds are of bodies, or else of effects.
+        // Combinations that are neither determined nor held belong to bodies or, without bodies, to effects.
         let open = if bodies.is_empty() {
             0
         } else {
@@ -228,7 +234,8 @@ impl<'a> Problem<'a> {
         verdict
     }
 
-    /// What no stretch of the logs tells of declared parameters alike, of a fit in which others are held already.
+    /// A combination of declared parameters on which the blocks of the logs disagree, in a fit in which others are held
+    /// already.
     pub(super) fn open_in(&self, fitted: &Fitted) -> Option<Open> {
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
@@ -237,13 +244,13 @@ impl<'a> Problem<'a> {
         open(&dynamics, self.readiness(), &values, fit, &covariance)
     }
 
-    /// Index behind the parameters of the declared equations and of the effects that the file carries.
+    /// Index after the parameters of the declared equations and of the file's effects.
     fn end_of_declared(&self) -> usize {
         self.declared.all_parameters().len()
     }
 
-    /// Parameters of the equations are held before those of effects that the file carries, and nothing else is. What nothing
-    /// tells of a body stays as it is declared, and so does the body.
+    /// Parameters of the equations are held before those of the file's effects, and nothing else is held. Whatever the
+    /// logs do not determine of a body stays as declared without being held.
     fn readiness(&self) -> impl Fn(usize) -> Option<usize> {
         let (of_equations, end) = (self.declared.parameters.len(), self.end_of_declared());
         let bodies: BTreeSet<usize> = self.declared.inertias().into_iter().flatten().collect();

@@ -3,7 +3,7 @@ use crate::identify::{Fit, Values};
 use crate::model::{Dynamics, FittedEffect, Model};
 use crate::sim::metric::{Trace, traces};
 
-/// A model as a fit to a problem's logs left it.
+/// A model fitted to a problem's logs.
 #[derive(Debug, Clone)]
 pub struct Fitted {
     /// With the values found.
@@ -13,7 +13,7 @@ pub struct Fitted {
 }
 
 impl Fitted {
-    /// `model`, compiled as `dynamics`, with what a fit of it to `logs` found.
+    /// `model`, compiled as `dynamics`, with the result of its fit to `logs`.
     pub(super) fn new(
         model: &Model,
         dynamics: &Dynamics,
@@ -26,7 +26,7 @@ impl Fitted {
         }
     }
 
-    /// What the fit leaves, in squares of the noise: its cost is in those of its own scale.
+    /// The cost of the fit in units of the squared noise: the fit states it in units of its squared scale.
     pub(super) fn loss(&self) -> f64 {
         self.fit.cost * self.fit.scale.powi(2)
     }

@@ -2,33 +2,38 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::error_model::ErrorModel;
 use super::problem::Problem;
 use super::settings::NoteSettings;
-use super::space::Space;
 use crate::data::{Audit, Finding, Severity, Smooth};
 use crate::decomposition::least_squares;
 use crate::model::Model;
 use crate::sim::metric::balance_of;
 
-/// Add to the audits of logs which of them hold another gravity than the declared bodies need, by their shares: a torque column
-/// that is only a part of the torque, a moment of another unit, another base.
-pub(super) fn tell_gravity(shares: &[Option<f64>], settings: &NoteSettings, audits: &mut [Audit]) {
+/// Report in the audits which logs hold another gravity than the declared bodies need, judged by their `shares`: a
+/// torque column that is only a part of the torque, a moment in another unit, another base.
+pub(super) fn report_gravity(
+    shares: &[Option<f64>],
+    settings: &NoteSettings,
+    audits: &mut [Audit],
+) {
     for (share, audit) in shares.iter().zip(audits) {
         if let Some(share) = share.filter(|share| contradicts(*share, settings)) {
-            let text = format!("{}. What is fitted to them imitates that", told(share));
+            let text = format!("{}. What is fitted to them imitates that", message(share));
             audit.add(Finding::new(Severity::Serious, text));
         }
     }
 }
 
-/// Why nothing can be concluded from torques that hold another gravity, in a sentence: by the median of the logs that tell.
+/// Why nothing can be concluded from torques that hold another gravity, in a sentence: judged by the median of the logs
+/// that show gravity.
 pub(super) fn against_gravity(shares: &[Option<f64>], settings: &NoteSettings) -> Option<String> {
     let mut shares: Vec<f64> = shares.iter().copied().flatten().collect();
     shares.sort_by(f64::total_cmp);
     let median = shares
         .get(shares.len() / 2)
         .filter(|share| contradicts(**share, settings))?;
-    Some(format!("{}; effects would imitate that", told(*median)))
+    Some(format!("{}; effects would imitate that", message(*median)))
 }
 
 fn contradicts(share: f64, settings: &NoteSettings) -> bool {
@@ -36,7 +41,7 @@ fn contradicts(share: f64, settings: &NoteSettings) -> bool {
     !(least..1.0 / least).contains(&share)
 }
 
-fn told(share: f64) -> String {
+fn message(share: f64) -> String {
     format!(
         "the logged torques hold {:.0} % of the gravity that the declared bodies need: they are not all of the joints' torques (a \
          command without the controller's gravity term, say), or masses, gravity's direction or the unit of the torques are \
@@ -45,9 +50,10 @@ fn told(share: f64) -> String {
     )
 }
 
-/// The share of the declared gravity in each log of a problem by torques, where it tells.
+/// The share of the declared gravity in the torques of each log, `None` if gravity hardly loads a joint; empty if
+/// motion is compared.
 pub(super) fn shares_of_gravity(problem: &Problem<'_>) -> Vec<Option<f64>> {
-    if problem.space != Space::Torque {
+    if problem.error_model != ErrorModel::InverseDynamics {
         return Vec::new();
     }
     let bodies = problem.declared.with_effects(Vec::new());
@@ -55,8 +61,8 @@ pub(super) fn shares_of_gravity(problem: &Problem<'_>) -> Vec<Option<f64>> {
     problem.logs.iter().map(of_log).collect()
 }
 
-/// The share of the declared gravity in the torques, by least squares beside acceleration, friction and an offset joint by
-/// joint, each weighing as much as its gravity varies; `None` where gravity hardly loads any.
+/// The share of the declared gravity in the torques, by least squares together with acceleration, friction and an
+/// offset, joint by joint, each weighted by the variance of its gravity; `None` if gravity hardly loads any joint.
 fn share(bodies: &Model, smooth: &Smooth, settings: &NoteSettings) -> Option<f64> {
     let balance = bodies.torque_balance()?;
     let (n, rows) = (bodies.joints, smooth.rows());
@@ -92,8 +98,8 @@ fn share(bodies: &Model, smooth: &Smooth, settings: &NoteSettings) -> Option<f64
         let found = least_squares(columns, &torque, 1e-9)?;
         Some((varies, found[0]))
     };
-    let told: Vec<(f64, f64)> = (0..n).filter_map(of_joint).collect();
-    let all: f64 = told.iter().map(|(varies, _)| varies).sum();
-    let held: f64 = told.iter().map(|(varies, share)| varies * share).sum();
+    let message: Vec<(f64, f64)> = (0..n).filter_map(of_joint).collect();
+    let all: f64 = message.iter().map(|(varies, _)| varies).sum();
+    let held: f64 = message.iter().map(|(varies, share)| varies * share).sum();
     (all > 0.0).then(|| held / all)
 }

@@ -3,6 +3,8 @@
 use rand::Rng;
 use rayon::prelude::*;
 
+use super::diagnostics::{Unexplained, diagnose};
+use super::error_model::ErrorModel;
 use super::establish::{Chosen, Standing};
 use super::every_log::EveryLog;
 use super::fit::Declared;
@@ -10,25 +12,24 @@ use super::fitted::Fitted;
 use super::gravity::{against_gravity, shares_of_gravity};
 use super::loss::Loss;
 use super::problem::Problem;
-use super::remainder::{Unexplained, diagnose};
-use super::space::Space;
 use crate::data::Log;
 use crate::model::{FittedEffect, Status};
 
-/// What the declared model lacks, as far as the logs tell.
+/// What the declared model lacks, judged by the logs.
 pub struct Found<'a> {
-    /// With what the logs determine of the declared parameters beside the effects.
+    /// With what the logs determine of the declared parameters, given the effects.
     pub problem: Problem<'a>,
     /// The declared model, fitted.
     pub before: Fitted,
     pub chosen: Chosen,
     pub unexplained: Unexplained,
-    /// The share of the declared gravity in the torques of each log, where they are compared and it tells.
+    /// The share of the declared gravity in the torques of each log, if torques are compared and gravity loads the
+    /// joints.
     pub gravity: Vec<Option<f64>>,
 }
 
-/// Doubt the effects that were established where the remainder that is `left`, single logs or gravity give a reason to, and look for
-/// a load at the tip.
+/// Demote established effects if the residual that is `left`, single logs or gravity give a reason, and look for a load
+/// at the tip.
 pub(super) fn judge<'a>(
     declared: Declared<'a>,
     mut chosen: Chosen,
@@ -43,7 +44,7 @@ pub(super) fn judge<'a>(
     if left.is_significant() {
         chosen.doubt(&problem, &before, &left);
     }
-    if problem.space == Space::Torque {
+    if problem.error_model == ErrorModel::InverseDynamics {
         chosen.ask_every_log(problem.logs.iter().chain(apart));
         if let Some((after, standing)) = problem.with_payload(&chosen.after) {
             chosen.after = after;
@@ -56,7 +57,7 @@ pub(super) fn judge<'a>(
     }
     chosen.mark(&problem);
     if chosen.established() == 0 && !chosen.standings.is_empty() {
-        // What is not established explains nothing.
+        // Effects that are not established explain nothing.
         left = diagnose(&problem, &before, &before, rng);
     }
     Found {
@@ -68,32 +69,32 @@ pub(super) fn judge<'a>(
     }
 }
 
-/// Why effects are not established that leave most of the loss and an unexplained remainder.
-const MASKING: &str = "an unexplained remainder stays, and all effects together cut the loss by less than half: it would \
+/// Why effects that leave most of the loss and an unexplained residual are not established.
+const MASKING: &str = "an unexplained residual stays, and all effects together cut the loss by less than half: it would \
                        mask the real cause";
 
-/// Why effects are not established that are fitted to a part of the torques.
+/// Why effects that are fitted to only a part of the torques are not established.
 const ANOTHER_GRAVITY: &str = "the torques hold another gravity than the declared bodies need, and it may imitate what they lack";
 
-/// Why an effect is not established beside a remainder that is larger.
+/// Why an effect is not established if the unexplained residual is larger.
 const OUTWEIGHED: &str =
     "over twice what it explains stays unexplained: it may be a part of the real cause's shape";
 
 impl Chosen {
-    /// Effects are not established beside a remainder that leaves most of what their joint lacks, or more than they explain.
-    fn doubt(&mut self, problem: &Problem<'_>, before: &Fitted, remainder: &Unexplained) {
+    /// Effects are not established if most of what their joint lacks, or more than they explain, stays unexplained.
+    fn doubt(&mut self, problem: &Problem<'_>, before: &Fitted, diagnostics: &Unexplained) {
         let settings = &problem.settings.establish;
         let [declared, with] = [before, &self.after].map(|model| Loss::of(problem, model));
         let left = |of: &Loss, effect: &FittedEffect| {
             of.on(effect) / declared.on(effect).max(f64::MIN_POSITIVE)
         };
         let masks = |effect: &FittedEffect| {
-            remainder.matters_on(problem, effect.joint)
+            diagnostics.matters_on(problem, effect.joint)
                 && left(&with, effect) > settings.masking_share
         };
         let is_outweighed = |standing: &Standing| {
             let effect = &standing.effect;
-            let least = settings.outweighed_share * remainder.fraction_on(problem, effect.joint);
+            let least = settings.outweighed_share * diagnostics.fraction_on(problem, effect.joint);
             let without = standing.without.as_ref();
             let without = without.map(|without| Loss::of(problem, without));
             without.is_ok_and(|without| left(&without, effect) - left(&with, effect) < least)
@@ -105,7 +106,7 @@ impl Chosen {
         });
     }
 
-    /// Effects are not established without which the torques of some log fit as well.
+    /// Effects are not established if the torques of some log fit as well without them.
     fn ask_every_log<'l>(&mut self, logs: impl Iterator<Item = &'l Log>) {
         let logs = EveryLog::of(logs, &self.after);
         demote(&mut self.standings, |standing| {
@@ -117,7 +118,7 @@ impl Chosen {
         });
     }
 
-    /// Note in the model how each of the effects stands.
+    /// Record the status of each effect in the model.
     fn mark(&mut self, problem: &Problem<'_>) {
         let model = &mut self.after.model;
         let added = problem.added(model);
@@ -127,7 +128,7 @@ impl Chosen {
     }
 }
 
-/// Established effects are no more than supported where there is a reason why not.
+/// Demote established effects to supported if there is a reason.
 fn demote(standings: &mut [Standing], reason: impl Fn(&Standing) -> Option<String> + Sync) {
     let established = |standing: &&mut Standing| standing.status == Status::Established;
     standings

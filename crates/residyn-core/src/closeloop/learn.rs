@@ -9,11 +9,11 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::problem::Problem;
 use super::refine::Refined;
 use super::settings::LearnSettings;
-use super::space::Space;
 use super::split::between;
 use super::stage::{Progress, Stage, Watch};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
@@ -30,15 +30,15 @@ pub struct ResidualTask {
     pub hidden: Vec<usize>,
     /// Motion as the model sees it.
     pub training: Vec<Trajectory>,
-    /// The same, to choose the epoch by.
+    /// As above, to choose the epoch.
     pub validation: Vec<Trajectory>,
     pub settings: LearnSettings,
 }
 
 /// Trains residual networks.
 pub trait ResidualLearner: Debug + Sync {
-    /// Train a network on what the equations leave and keep the epoch that predicts the validation stretches best; the
-    /// untrained network is among the candidates. `None` where the stretches are too short. `progress` receives the
+    /// Train a network on the residual of the equations and keep the epoch that predicts the validation blocks best;
+    /// the untrained network is among the candidates. `None` if the blocks are too short. `progress` receives the
     /// epoch.
     ///
     /// # Errors
@@ -76,8 +76,7 @@ impl LearnError {
 
 /// The residual network, and whether it helps on motion that it was not trained on.
 pub struct Learned {
-    /// Where it is not used, one that is not trained and adds nothing; `None` where the model that it would be added to leaves
-    /// the finite numbers by itself.
+    /// If it is not used, an untrained network, which adds nothing; `None` if the model is not finite even without it.
     pub network: Option<Box<dyn LearnedResidual>>,
     pub check: NetworkCheck,
 }
@@ -89,17 +88,17 @@ impl Learned {
     }
 }
 
-/// Open-loop position errors at the middle horizon on parts of the training logs, by networks that were trained on the
-/// other parts; up to the first part without a network, where a training failed.
+/// Open-loop position errors at the middle horizon on parts of the training logs, by networks trained on the other
+/// parts; if a training failed, only on the parts before it.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct NetworkCheck {
-    /// of the model without a network in each part, rad (or m)
+    /// of the model without a network on each part, rad (or m)
     pub without: Vec<f64>,
     /// of the model with the network that was trained on the other parts
     pub with: Vec<f64>,
-    /// whether the network is used: where it is not, it adds nothing
+    /// whether the network is used; if not, it adds nothing
     pub used: bool,
-    /// why a training could not be finished: where its loss left the finite numbers. No network is used then
+    /// why a training could not be finished: where its loss was no longer finite. No network is used then
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
@@ -112,7 +111,7 @@ impl NetworkCheck {
         Self {
             without: errors.iter().map(|e| e[0]).collect(),
             with: errors.iter().map(|e| e[1]).collect(),
-            // Not a number where a prediction is none: then it is not used.
+            // NaN if a prediction is not finite: the network is then not used.
             used: !harms && total(1) <= settings.helpful_ratio * total(0),
             failure: None,
         }
@@ -127,8 +126,8 @@ impl NetworkCheck {
     }
 }
 
-/// Train the residual network on what the refined model leaves, and keep it if it helps on parts of the logs that it was
-/// not trained on. `None` where no network is asked for or the logs are too few to train one.
+/// Train the residual network on the residual of the refined model, and keep it if it helps on parts of the logs that
+/// it was not trained on. `None` if no network is requested or the logs are too few to train one.
 pub fn learn(
     refined: &Refined<'_>,
     learner: Option<&dyn ResidualLearner>,
@@ -136,7 +135,7 @@ pub fn learn(
     watch: &dyn Watch,
 ) -> Option<Learned> {
     // A network is trained on motion.
-    let learner = learner.filter(|_| refined.problem.space == Space::Motion)?;
+    let learner = learner.filter(|_| refined.problem.error_model == ErrorModel::OutputError)?;
     let (problem, fitted) = (&refined.problem, &refined.after);
     let mut tell = |text: &str| {
         let text = format!("{}, {text}", Stage::Learn.text());
@@ -160,7 +159,7 @@ pub fn learn(
             Err(failure) => check = check.failed(&failure),
         }
     }
-    // A network that is not trained adds nothing.
+    // An untrained network adds nothing.
     let (network, check) = match train(problem.logs, 0) {
         Ok(network) => (Some(network?), check),
         Err(failure) => (None, check.failed(&failure)),
@@ -171,7 +170,8 @@ pub fn learn(
 /// Trains a network on some of the logs.
 type Train<'a> = dyn FnMut(&[Log]) -> Result<Option<Box<dyn LearnedResidual>>, LearnError> + 'a;
 
-/// Whether networks help on parts of the logs that they were not trained on. `None` where the logs are too few to train one.
+/// Whether networks help on parts of the logs that they were not trained on. `None` if the logs are too few to train
+/// one.
 fn checked(problem: &Problem<'_>, fitted: &Fitted, train: &mut Train<'_>) -> Option<NetworkCheck> {
     let settings = &problem.settings.learn;
     let parts = parts(problem.logs, settings.check_parts);
@@ -193,7 +193,7 @@ fn checked(problem: &Problem<'_>, fitted: &Fitted, train: &mut Train<'_>) -> Opt
     Some(NetworkCheck::of(&errors, settings))
 }
 
-/// The logs in so many parts: whole logs in turn or, where there are fewer, pieces of each.
+/// The logs in `count` parts: whole logs in turn or, if there are fewer logs, pieces of each.
 fn parts(logs: &[Log], count: usize) -> Vec<Vec<Log>> {
     if logs.len() >= count {
         let of = |part: usize| logs.iter().skip(part).step_by(count).cloned().collect();
@@ -214,20 +214,20 @@ fn task(
     logs: &[Log],
     settings: LearnSettings,
 ) -> ResidualTask {
-    // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
+    // The checkpoint's model file has shifted parameters in their places, and so must the trained equations.
     let equations = fitted.model.absorbed().dynamics();
     let thinning = Thinning {
         step_s: settings.step_s,
-        length_s: settings.stretch_s,
+        length_s: settings.block_s,
     };
     let dynamics = fitted.model.dynamics();
     let of_log = |log: &Log| trajectories(&as_modelled(&*dynamics.in_log(log), log), thinning);
-    let stretches = logs.iter().flat_map(of_log);
+    let blocks = logs.iter().flat_map(of_log);
     let (mut training, mut validation) = (Vec::new(), Vec::new());
-    for (k, stretch) in stretches.enumerate() {
+    for (k, block) in blocks.enumerate() {
         match (k + 1).is_multiple_of(settings.validation_every) {
-            true => validation.push(stretch),
-            false => training.push(stretch),
+            true => validation.push(block),
+            false => training.push(block),
         }
     }
     ResidualTask {

@@ -3,7 +3,8 @@ use super::problem::Problem;
 use super::select::Losses;
 use crate::model::FittedEffect;
 
-/// Losses of a model on stretches left out of its fit, in one unit for all models: a fit's own is its scale.
+/// Losses of a model on blocks left out of its fit, in one unit for all models: a fit's own losses are in units of its
+/// scale.
 pub(super) struct Loss {
     losses: Losses,
     unit: f64,
@@ -21,7 +22,7 @@ impl Loss {
         self.losses.total() * self.unit
     }
 
-    /// Of what an effect is judged by.
+    /// The loss on the parts that an effect is judged by.
     pub fn on(&self, effect: &FittedEffect) -> f64 {
         self.losses.of_effect(effect).iter().sum::<f64>() * self.unit
     }

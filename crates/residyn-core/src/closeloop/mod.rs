@@ -1,17 +1,20 @@
 //! Closing the loop: from logs and a declared model to the effects that the model lacks.
 //!
-//! [`close_loop`] goes through the stages of `docs/method.md`, each a function from one type to the next: [`prepare`] the logs,
-//! [`fit`] the declared model, [`screen`] the effects that it may lack, [`select`] a set of them, [`establish`] each, [`diagnose`]
-//! what remains, [`discriminate`] between explanations, [`refine`], [`learn`] and [`score`]. What they work on is a [`Problem`], which
-//! none of them changes.
+//! [`close_loop`] goes through the stages of `docs/method.md`, each a function from one type to the next: [`prepare`]
+//! the logs, [`fit`] the declared model, [`screen`] the effects that it may lack, [`select`] a set of them,
+//! [`establish`] each, [`diagnose`] what remains, [`discriminate`] between explanations, [`refine`], [`learn`] and
+//! [`score`]. They work on a [`Problem`], which none of them changes.
 
 mod by_log;
 mod calibrate;
-mod choose;
+mod diagnostics;
 mod discriminate;
 mod error;
+mod error_model;
+mod error_model_choice;
 mod establish;
 mod every_log;
+mod external_force;
 mod fit;
 mod fitted;
 mod gravity;
@@ -24,29 +27,31 @@ mod payload;
 mod pipeline;
 mod prepare;
 mod problem;
-mod pushes;
 mod refine;
-mod remainder;
 mod request;
-mod reversal;
-mod reversed;
 mod score;
 mod select;
 mod settings;
-mod space;
+mod smoothing;
 mod split;
 mod stage;
 mod start;
 #[cfg(test)]
 mod tests;
+mod torque_sign;
 mod verdict;
 
 pub use by_log::OfLog;
 pub use calibrate::{
     Calibration, Calibrator, DetectionLimit, Named, Searched, Simulation, Smallest,
 };
+pub use diagnostics::{
+    Curve, ForceSample, Omnibus, Probed, Proposal, ResidualForce, UNKNOWN, Unexplained, diagnose,
+    proposal, unexplained,
+};
 pub use discriminate::{Alternative, NotSimulated, Separation, discriminate};
 pub use error::StudyError;
+pub use error_model::ErrorModel;
 pub use establish::{Chosen, Standing, establish};
 pub use fit::{Declared, fit};
 pub use fitted::Fitted;
@@ -54,15 +59,11 @@ pub use judge::Found;
 pub use learn::{
     LearnError, Learned, LearnedResidual, NetworkCheck, ResidualLearner, ResidualTask, learn,
 };
-pub use outcome::{Effects, Given, Models, Outcome, Remainder};
+pub use outcome::{Diagnostics, Effects, Given, Models, Outcome};
 pub use pipeline::{close_loop, find, solve};
 pub use prepare::{Prepared, ReadyLogs, prepare};
 pub use problem::{Problem, Sample};
 pub use refine::{Refined, refine, with_intervals};
-pub use remainder::{
-    Curve, ForceSample, Omnibus, Probed, Proposal, ResidualForce, UNKNOWN, Unexplained, diagnose,
-    proposal, unexplained,
-};
 pub use request::{Logs, Reference, Request};
 pub use score::{
     Contradicted, Errors, Finding, Needed, Predicted, Predictions, Scores, TestLog, TorqueErrors,
@@ -70,11 +71,10 @@ pub use score::{
 };
 pub use select::{Rival, Round, Selected, Tried, candidates, screen, select};
 pub use settings::{
-    CalibrateSettings, CurveSettings, DiscriminateSettings, EstablishSettings, FitSettings,
-    LearnSettings, NoteSettings, ProposalSettings, RefineSettings, RemainderSettings,
-    ScoreSettings, SelectSettings, Settings, SplitSettings, VerdictSettings,
+    CalibrateSettings, CurveSettings, DiagnosticsSettings, DiscriminateSettings, EstablishSettings,
+    FitSettings, LearnSettings, NoteSettings, ProposalSettings, RefineSettings, ScoreSettings,
+    SelectSettings, Settings, SplitSettings, VerdictSettings,
 };
-pub use space::Space;
 pub use split::between;
 pub use split::{Split, SplitMethod};
 pub use stage::{Fits, Progress, Stage, StageTimes, Watch};

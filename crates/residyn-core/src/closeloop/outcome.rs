@@ -2,7 +2,9 @@ use std::sync::Arc;
 
 use super::by_log::OfLog;
 use super::calibrate::Calibration;
+use super::diagnostics::{Proposal, ResidualForce, Unexplained, proposal};
 use super::discriminate::Alternative;
+use super::error_model::ErrorModel;
 use super::establish::Chosen;
 use super::fitted::Fitted;
 use super::judge::Found;
@@ -10,40 +12,39 @@ use super::learn::{Learned, LearnedResidual};
 use super::prepare::Prepared;
 use super::problem::Problem;
 use super::refine::Refined;
-use super::remainder::{Proposal, ResidualForce, Unexplained, proposal};
 use super::score::{Contradicted, Errors, Finding, Predictions, contradicted};
 use super::select::Round;
 use super::settings::Settings;
-use super::space::Space;
 use super::split::SplitMethod;
 use super::stage::Stage;
 use super::verdict::Verdict;
 use crate::data::{Audit, Log};
-use crate::identify::{BodiesTold, FitError, Identifiability, Uncertainty};
+use crate::identify::{FitError, Identifiability, IdentifiableBodies, Uncertainty};
 use crate::model::{Library, Model, Parameter, Status};
 
 /// Everything that closing the loop found out.
 #[non_exhaustive]
 pub struct Outcome {
     /// Which errors were compared.
-    pub space: Space,
+    pub error_model: ErrorModel,
     pub verdict: Verdict,
     /// Why, in a sentence.
     pub reason: String,
     pub given: Given,
     pub models: Models,
     pub effects: Effects,
-    pub remainder: Remainder,
+    pub diagnostics: Diagnostics,
     pub errors: Errors,
-    /// What the models predict of the test logs.
+    /// What the models predict for the test logs.
     pub predictions: Predictions,
-    /// The residual network and whether it helps, where the logs suffice to train one.
+    /// The residual network and whether it helps, if the logs suffice to train one.
     pub learned: Option<Learned>,
     /// The chosen model fitted to each training log alone; empty for a single log and for very many.
     pub by_log: Vec<OfLog>,
-    /// What the training logs could show, where that was asked for: see [`Calibrator`](super::Calibrator).
+    /// What the training logs could show, if that was requested: see [`Calibrator`](super::Calibrator).
     pub calibration: Option<Calibration>,
-    /// How long each stage took in s, for whoever watched the work to fill in (see [`StageTimes`](super::StageTimes)); empty at first.
+    /// How long each stage took in s, to be filled in by the watcher (see [`StageTimes`](super::StageTimes)); empty at
+    /// first.
     pub seconds: Vec<(Stage, f64)>,
 }
 
@@ -51,16 +52,16 @@ pub struct Outcome {
 #[non_exhaustive]
 pub struct Given {
     pub train: Arc<[Log]>,
-    /// The training logs as they were fitted: with readings that jump masked and dropped rows put in or left out.
+    /// The training logs as they were fitted: with jumping readings masked and dropped rows filled in or left out.
     pub studied: Arc<[Log]>,
     pub test: Arc<[Log]>,
-    /// Names of the test logs that are training logs once more: they were fitted, and test nothing.
+    /// Names of the test logs that repeat training logs: they were fitted, and test nothing.
     pub fitted_tests: Vec<String>,
     pub split: SplitMethod,
     /// Of the training logs, then of the test logs.
     pub audits: Vec<Audit>,
     pub settings: Settings,
-    /// Horizons in s of which the test logs hold no window.
+    /// Horizons in s for which the test logs hold no window.
     pub unscored_s: Vec<f64>,
     /// For each joint whether it slides rather than turns.
     pub prismatic: Vec<bool>,
@@ -77,13 +78,13 @@ pub struct Models {
     pub after: Fitted,
     /// How well the fit of `after` determines its values.
     pub uncertainty: Uncertainty,
-    /// The free declared parameters at the values that their fit began with, where the model diverges with those in its file;
-    /// else empty.
+    /// The free declared parameters at the starting values of their fit, if the model diverges at the values in its
+    /// file; else empty.
     pub moved_to: Vec<Parameter>,
     /// What the logs determine of the declared parameters.
     pub identifiability: Identifiability,
-    /// What they tell of the bodies of a chain, where torques were compared.
-    pub bodies: BodiesTold,
+    /// What the logs determine of a chain's bodies, if torques were compared.
+    pub bodies: IdentifiableBodies,
     /// Values in the model file that the fit of `after` contradicts.
     pub contradicted: Vec<Contradicted>,
 }
@@ -93,36 +94,36 @@ pub struct Models {
 pub struct Effects {
     /// Those that are established.
     pub findings: Vec<Finding>,
-    /// Those that are not, and yet lower the loss on stretches left out of the fit: the model has them, but their names
-    /// are not to be relied on.
+    /// Effects that are not established, yet lower the loss on blocks left out of the fit: the model has them, but
+    /// their names cannot be relied on.
     pub supported: Vec<Finding>,
-    /// What the logs do not tell from the findings.
+    /// Explanations that the logs do not distinguish from the findings.
     pub alternatives: Vec<Alternative>,
     /// What was tried.
     pub rounds: Vec<Round>,
-    /// Whether the search was stopped because its time was spent.
+    /// Whether the search was stopped because its time ran out.
     pub stopped: bool,
 }
 
 /// What the effects leave unexplained.
 #[non_exhaustive]
-pub struct Remainder {
+pub struct Diagnostics {
     pub unexplained: Unexplained,
-    /// A formula for it, where something that matters is left.
+    /// A formula for it, if something that matters is left.
     pub proposal: Option<Proposal>,
-    /// Residual generalised force of the declared model, fitted, or why there is none.
+    /// Residual generalised force of the fitted declared model, or why there is none.
     pub before: Result<ResidualForce, FitError>,
     /// The same with the effects that were found.
     pub after: Result<ResidualForce, FitError>,
 }
 
 impl Outcome {
-    /// The residual network, where there is one.
+    /// The residual network, if there is one.
     pub fn network(&self) -> Option<&dyn LearnedResidual> {
         self.learned.as_ref()?.network.as_deref()
     }
 
-    /// What was studied once more, for the model and the library that it was studied with.
+    /// The problem that was studied, rebuilt for the model and the library that it was studied with.
     pub fn problem<'a>(&'a self, declared: &'a Model, library: &'a Library) -> Problem<'a> {
         let Given {
             studied,
@@ -134,7 +135,7 @@ impl Outcome {
         Problem::audited(
             declared,
             library,
-            self.space,
+            self.error_model,
             (&**studied, audits),
             settings,
         )
@@ -197,7 +198,7 @@ impl Effects {
     }
 }
 
-impl Remainder {
+impl Diagnostics {
     pub(super) fn of(found: &Found<'_>, refined: &Refined<'_>) -> Self {
         let problem = &found.problem;
         let (before, after) = rayon::join(

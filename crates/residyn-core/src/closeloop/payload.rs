@@ -1,5 +1,6 @@
 //! A load at the tip of an arm. Where the bodies of a chain are free, the last of them can stand for any load, and no torque
-//! tells the two apart; but a body that is drawn is off by shares, and a load that it lacks makes it another one.
+//! distinguishes the two; but a body known from a drawing is off by a fraction, and a missing load makes it a different
+//! one.
 
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -11,9 +12,9 @@ use crate::data::Joint;
 use crate::identify::Fit;
 use crate::model::{Effect, Entry, FittedEffect, Status};
 
-/// What a fit costs, with what the declared values do.
+/// The cost of a fit, including that of its prior.
 fn whole(fit: &Fit) -> f64 {
-    fit.cost + fit.departure
+    fit.cost + fit.prior_cost
 }
 
 impl Problem<'_> {
@@ -23,7 +24,8 @@ impl Problem<'_> {
         parts.any(|part| !self.declared.parameters[part].fixed)
     }
 
-    /// The chosen model with a load at its tip, where most of what its bodies depart from the declared ones is one load.
+    /// The chosen model with a load at its tip, if one load accounts for most of its bodies' departure from the
+    /// declared ones.
     pub(super) fn with_payload(&self, chosen: &Fitted) -> Option<(Fitted, Standing)> {
         if !self.has_free_bodies() {
             return None;
@@ -47,8 +49,8 @@ impl Problem<'_> {
         let saved = whole(&chosen.fit) - whole(&with.fit);
         let settings = &self.settings.establish;
         let p_value = p_of(2.0 * saved, effect.parameters.len());
-        let is_clear =
-            saved > settings.payload_share * chosen.fit.departure && p_value < settings.false_alarm;
+        let is_clear = saved > settings.payload_share * chosen.fit.prior_cost
+            && p_value < settings.false_alarm;
         let effect = with.model.effects.last()?.clone();
         is_clear.then(|| {
             let standing = Standing {
@@ -63,7 +65,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Loads of some masses, at the place where they change the last body's first moments as the chosen model did.
+    /// Loads of several masses, each placed to change the last body's first moments as the chosen model did.
     fn loads(&self, chosen: &Fitted, effect: &Effect, tip: Joint) -> Option<[FittedEffect; 4]> {
         let last = *self.declared.inertias().last()?;
         let declared = |part: usize| self.declared.parameters[last[part]].value;
@@ -85,7 +87,8 @@ impl Problem<'_> {
         Some(self.settings.establish.payload_masses.map(load))
     }
 
-    /// The chosen model with a load, fitted from the declared bodies: those of the chosen model stand for the load already.
+    /// The chosen model with a load, fitted from the declared bodies: the chosen model's bodies already absorb the
+    /// load.
     fn loaded(&self, chosen: &Fitted, load: FittedEffect) -> Option<Fitted> {
         let mut start = chosen.clone();
         for part in self.declared.inertias().into_iter().flatten() {
@@ -96,7 +99,7 @@ impl Problem<'_> {
     }
 }
 
-/// The probability of so large a fall of twice the cost by chance, where the declared bodies are off as they usually are.
+/// The probability that twice the cost falls this much by chance, if the declared bodies are off as they usually are.
 fn p_of(twice: f64, values: usize) -> f64 {
     let by_chance = ChiSquared::new(values as f64).expect("there are values");
     1.0 - by_chance.cdf(twice.max(0.0))

@@ -2,27 +2,27 @@
 
 use rand::Rng;
 
+use super::diagnostics::diagnose;
 use super::discriminate::discriminate;
 use super::error::StudyError;
+use super::error_model::ErrorModel;
 use super::establish::{Chosen, establish};
 use super::fit::{Declared, fit};
 use super::judge::{Found, judge};
 use super::learn::learn;
 use super::loss::Loss;
 use super::notes::noted;
-use super::outcome::{Effects, Given, Models, Outcome, Remainder};
+use super::outcome::{Diagnostics, Effects, Given, Models, Outcome};
 use super::prepare::{Prepared, prepare};
 use super::refine::refine;
-use super::remainder::diagnose;
 use super::request::Request;
 use super::score::score;
 use super::select::{select, select_from};
-use super::space::Space;
 use super::stage::{Stage, Watch};
 use crate::data::Log;
 
-/// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
-/// network on the remainder, and score the models before and after on the test logs.
+/// Fit the declared model, add effects while they lower the loss on blocks left out of the fit, train the residual
+/// network on what is left, and score the models before and after on the test logs.
 ///
 /// # Errors
 /// Logs without a usable window, or a declared model that diverges from its starting values.
@@ -34,7 +34,7 @@ pub fn close_loop(
     solve(&prepare(request, watch), rng, watch)
 }
 
-/// The same with logs that are ready.
+/// The same, with prepared logs.
 ///
 /// # Errors
 /// As [`close_loop`].
@@ -47,20 +47,20 @@ pub fn solve(
     let found = find(declared, &prepared.test.for_fits, rng, watch)?;
     let alternatives = discriminate(&found, watch);
     let refined = refine(&found, watch);
-    let remainder = Remainder::of(&found, &refined);
+    let diagnostics = Diagnostics::of(&found, &refined);
     let with_friction = found.problem.with_usual_friction();
-    let audits = noted(prepared, &found, with_friction.as_ref(), &remainder);
+    let audits = noted(prepared, &found, with_friction.as_ref(), &diagnostics);
     let learned = learn(&refined, prepared.learner, rng, watch);
     let rivals = (with_friction.as_ref(), learned.as_ref());
     let scores = score(prepared, &found, &refined, rivals, rng, watch);
     Ok(Outcome {
-        space: found.problem.space,
+        error_model: found.problem.error_model,
         verdict: scores.verdict,
         reason: scores.reason,
         given: Given::of(prepared, audits),
         models: Models::of(&found.problem, refined),
         effects: Effects::of(scores.findings, alternatives, found.chosen),
-        remainder,
+        diagnostics,
         errors: scores.errors,
         predictions: scores.predictions,
         learned,
@@ -70,9 +70,9 @@ pub fn solve(
     })
 }
 
-/// Search the logs for what the declared model lacks: select the set of effects that explains them best, judge each of it, and
-/// test the residuals. Where torques are compared, those of the logs that are set `apart` have to be fitted better by an effect
-/// as well, though nothing is fitted to them.
+/// Search the logs for what the declared model lacks: select the set of effects that explains them best, judge each
+/// effect, and test the residuals. If torques are compared, an effect must also improve the fit of the logs set
+/// `apart`, to which nothing is fitted.
 ///
 /// # Errors
 /// As [`Problem::fit_declared`](super::Problem::fit_declared).
@@ -86,7 +86,7 @@ pub fn find<'a>(
     if let Some(slower) = best.with_slower_reversals(watch)? {
         best = slower;
     }
-    watch.see(Stage::Remainder.into());
+    watch.see(Stage::Diagnostics.into());
     let mut left = best.diagnose(rng);
     if (left.is_significant() || best.chosen.failure.is_some())
         && let Some(other) = best.searched_again(watch)
@@ -97,7 +97,7 @@ pub fn find<'a>(
     Ok(judge(best.declared, best.chosen, left, apart, rng))
 }
 
-/// A search for effects, and what it began with.
+/// A search for effects, and the fit that it began with.
 struct Searched<'a> {
     declared: Declared<'a>,
     chosen: Chosen,
@@ -111,23 +111,23 @@ impl<'a> Searched<'a> {
         Self { declared, chosen }
     }
 
-    /// The search with dry friction that reverses over wider speeds, if that leaves less.
+    /// The search with wider smoothing velocities, if its loss is lower.
     fn with_slower_reversals(&self, watch: &dyn Watch) -> Result<Option<Self>, StudyError> {
         let problem = &self.declared.problem;
         let Some((widths, narrowest)) = problem.wider_reversal(&self.chosen.after, watch) else {
             return Ok(None);
         };
-        let declared = problem.with_sign_widths(widths).fit_declared()?;
+        let declared = problem.with_smoothing_velocities(widths).fit_declared()?;
         let other = Self::of(declared, watch);
         Ok((other.loss() < narrowest).then_some(other))
     }
 
-    /// A search that begins over short windows and from the declared values, if it leaves less: with most of the force missing,
-    /// fits over longer ones end in minima from which no set of effects looks right, and where other parameters seem
-    /// undetermined.
+    /// A search that begins over short windows and from the declared values, if its loss is lower: with most of the
+    /// force missing, fits over longer windows end in minima from which no set of effects looks right, and at which
+    /// other parameters seem undetermined.
     fn searched_again(&self, watch: &dyn Watch) -> Option<Self> {
         let Declared { problem, fitted } = &self.declared;
-        if problem.space == Space::Torque || watch.has_to_end() {
+        if problem.error_model == ErrorModel::InverseDynamics || watch.has_to_end() {
             return None;
         }
         let short = problem.fitted_over_short_windows().ok()?;
@@ -144,7 +144,7 @@ impl<'a> Searched<'a> {
         Loss::of(&self.declared.problem, &self.chosen.after).total()
     }
 
-    fn diagnose(&self, rng: &mut impl Rng) -> super::remainder::Unexplained {
+    fn diagnose(&self, rng: &mut impl Rng) -> super::diagnostics::Unexplained {
         let Declared { problem, fitted } = &self.declared;
         diagnose(problem, fitted, &self.chosen.after, rng)
     }

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use super::error::StudyError;
+use super::error_model::ErrorModel;
 use super::learn::ResidualLearner;
 use super::problem::Problem;
 use super::request::{Reference, Request};
 use super::settings::Settings;
-use super::space::Space;
 use super::split::SplitMethod;
 use super::stage::{Stage, Watch};
 use crate::data::{Audit, Finding, Log, Severity, audit_together};
@@ -15,7 +15,7 @@ use crate::limits::FITTED_PARAMETERS;
 use crate::model::{Library, Model};
 use crate::sim::metric::window_count;
 
-/// What is asked, with the logs made ready.
+/// The request, with its logs made ready.
 pub struct Prepared<'a> {
     /// The declared model.
     pub model: &'a Model,
@@ -23,12 +23,12 @@ pub struct Prepared<'a> {
     pub library: &'a Library,
     /// Models to score as they are.
     pub against: Vec<Reference>,
-    /// Of the horizons those that a test log is long enough for.
+    /// With the horizons that a test log is long enough for.
     pub settings: Settings,
-    /// Horizons in s of which the test logs hold no window.
+    /// Horizons in s for which the test logs hold no window.
     pub unscored_s: Vec<f64>,
-    /// Which errors to compare; without it, those that say more about these logs.
-    pub space: Option<Space>,
+    /// Which errors to compare; if not given, those that say more about these logs.
+    pub error_model: Option<ErrorModel>,
     /// Trains the residual network; without it there is none.
     pub learner: Option<&'a dyn ResidualLearner>,
     pub split: SplitMethod,
@@ -38,15 +38,15 @@ pub struct Prepared<'a> {
 
 /// Some logs, in the order of their names.
 pub struct ReadyLogs {
-    /// As they were read; of long ones a part.
+    /// As they were read; only a part of long ones.
     pub logs: Arc<[Log]>,
-    /// With readings that jump masked and dropped rows put in or left out.
+    /// With jumping readings masked and dropped rows filled in or left out.
     pub for_fits: Arc<[Log]>,
-    /// One a log.
+    /// One per log.
     pub audits: Vec<Audit>,
 }
 
-/// Put the logs in order, audit each of them, once, and make them ready for fits.
+/// Put the logs in order, audit each once, and make them ready for fits.
 pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> {
     watch.see(Stage::Audit.into());
     let split = request.divided();
@@ -55,7 +55,7 @@ pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> 
         library,
         against,
         mut settings,
-        space,
+        error_model,
         learner,
         ..
     } = request;
@@ -82,7 +82,7 @@ pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> 
         library,
         against,
         unscored_s,
-        space,
+        error_model,
         learner,
         settings,
     }
@@ -90,8 +90,8 @@ pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> 
 
 impl Prepared<'_> {
     /// # Errors
-    /// Test logs without a window of any horizon, torques that are to be compared and cannot be, or more free parameters than
-    /// can be fitted.
+    /// Test logs too short for every horizon, torques that are to be compared but cannot be, or more free parameters
+    /// than can be fitted.
     pub(super) fn check(&self) -> Result<(), StudyError> {
         let free = self.model.free_parameters();
         if free > FITTED_PARAMETERS {
@@ -108,7 +108,9 @@ impl Prepared<'_> {
                 found: self.serious_in_test(),
             });
         }
-        if self.space == Some(Space::Torque) && self.model.torque_balance().is_none() {
+        if self.error_model == Some(ErrorModel::InverseDynamics)
+            && self.model.torque_balance().is_none()
+        {
             return Err(StudyError::without_torques(self.model));
         }
         Ok(())
@@ -117,25 +119,25 @@ impl Prepared<'_> {
     /// The first serious finding about a test log, as the end of a sentence; empty without one.
     fn serious_in_test(&self) -> String {
         let mut found = self.test.audits.iter().flat_map(|audit| {
-            let told = |finding: &Finding| format!("; {}: {finding}", audit.log);
-            audit.serious().map(told).next()
+            let message = |finding: &Finding| format!("; {}: {finding}", audit.log);
+            audit.serious().map(message).next()
         });
         found.next().unwrap_or_default()
     }
 
     /// The problem, in terms of these errors.
-    pub(super) fn problem(&self, space: Space) -> Problem<'_> {
+    pub(super) fn problem(&self, error_model: ErrorModel) -> Problem<'_> {
         let logs = (&*self.train.for_fits, self.train.audits.clone());
-        Problem::audited(self.model, self.library, space, logs, &self.settings)
+        Problem::audited(self.model, self.library, error_model, logs, &self.settings)
     }
 
-    /// The audits of all logs, those of the test last.
+    /// The audits of all logs, the test logs last.
     pub fn audits(&self) -> impl Iterator<Item = &Audit> {
         self.train.audits.iter().chain(&self.test.audits)
     }
 }
 
-/// What fits read of logs; of long ones their audits say so.
+/// The part of each log that fits read; the audits report the logs that were shortened.
 fn shortened(logs: Vec<Log>, audits: &mut [Audit]) -> Vec<Log> {
     let shorten = |(log, audit): (Log, &mut Audit)| {
         let is_long = log.is_long();

@@ -1,9 +1,9 @@
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
+use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
-use super::space::Space;
 use super::split::by_numbers;
 use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, fit_below};
@@ -11,7 +11,7 @@ use crate::model::{Dynamics, Effect, FittedEffect, Library, Model, Parameter};
 
 /// A declared model, the effects that it may lack, and the logs to learn from, with what follows from them.
 ///
-/// Nothing changes it: what a stage finds out is in the copy that it returns. Copies share what is large, the audits, the smoothed
+/// It is never changed: a stage returns its results in a copy. Copies share the large parts: the audits, the smoothed
 /// logs and the batches of windows.
 #[derive(Clone)]
 pub struct Problem<'a> {
@@ -19,22 +19,22 @@ pub struct Problem<'a> {
     pub declared: &'a Model,
     /// The effects that it may lack.
     pub library: &'a Library,
-    pub space: Space,
+    pub error_model: ErrorModel,
     pub settings: &'a Settings,
     pub logs: &'a [Log],
-    /// One a log, made when it is first asked for.
+    /// One per log, made on first use.
     pub(super) audits: Arc<OnceLock<Vec<Audit>>>,
     /// Speed of each joint over which dry friction reverses, in rad/s (or m/s).
-    pub sign_widths: Vec<f64>,
-    /// Top speed, top torque and largest torque or command in the logs of each joint.
+    pub smoothing_velocities: Vec<f64>,
+    /// Each joint's top speed, top torque and largest torque or command in the logs.
     pub top_speed: Vec<f64>,
     pub top_torque: Vec<f64>,
     pub top_driving: Vec<f64>,
     pub shooting: Shooting<'a>,
     /// A few of its windows, spread evenly, for comparing starting points.
     pub sample: Sample<'a>,
-    /// The free declared parameters at the values that their fit began with, where the model diverges with those in its file;
-    /// else empty.
+    /// The free declared parameters at the starting values of their fit, if the model diverges at the values in its
+    /// file; else empty.
     pub moved_to: Vec<Parameter>,
     /// What the logs determine of the declared parameters.
     pub identifiability: Identifiability,
@@ -61,8 +61,8 @@ impl<'a> Sample<'a> {
         }
     }
 
-    /// The local values of these windows, of those of all.
-    pub fn locals(&self, all: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    /// The start states of these windows, out of those of all windows.
+    pub fn start_states(&self, all: &[Vec<f64>]) -> Vec<Vec<f64>> {
         self.members.iter().map(|&w| all[w].clone()).collect()
     }
 }
@@ -77,21 +77,27 @@ impl<'a> Problem<'a> {
     ) -> Self {
         let audits = logs.iter().map(|log| audit(log, &declared.columns));
         let audits = audits.collect();
-        Self::audited(declared, library, Space::Motion, (logs, audits), settings)
+        Self::audited(
+            declared,
+            library,
+            ErrorModel::OutputError,
+            (logs, audits),
+            settings,
+        )
     }
 
     /// A problem of logs with their audits.
     pub(super) fn audited(
         declared: &'a Model,
         library: &'a Library,
-        space: Space,
+        error_model: ErrorModel,
         (logs, audits): (&'a [Log], Vec<Audit>),
         settings: &'a Settings,
     ) -> Self {
         let FitSettings {
             window_s,
             sample_windows,
-            sign_width_share,
+            smoothing_velocity_share,
             ..
         } = settings.fit;
         let top = |f: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
@@ -105,7 +111,7 @@ impl<'a> Problem<'a> {
         let largest = |channel: &[f64]| channel.iter().fold(0.0, |top: f64, x| top.max(x.abs()));
         let top_torque = top(&|l, j| largest(&torques[l][j]));
         let top_driving = top(&|l, j| largest(&logs[l].tau[j]));
-        // Encoders that are finer than their noise show it; coarse ones add the error of rounding.
+        // Encoders finer than their noise show it; coarse ones add quantisation error.
         let noise = top(&|l, j| {
             let channel = &audits[l].joints[j].q;
             channel
@@ -116,25 +122,27 @@ impl<'a> Problem<'a> {
         let by_speed = || {
             top_speed
                 .iter()
-                .map(|speed| sign_width_share * speed.max(1e-6))
+                .map(|speed| smoothing_velocity_share * speed.max(1e-6))
                 .collect()
         };
-        let sign_widths: Vec<f64> = declared.sign_width.clone().unwrap_or_else(by_speed);
-        // What a joint's torque owes to other things than the model shows when it is fitted.
-        let noise = match space {
-            Space::Motion => noise,
-            Space::Torque => vec![1.0; declared.joints],
+        let smoothing_velocities: Vec<f64> =
+            declared.smoothing_velocity.clone().unwrap_or_else(by_speed);
+        // Torque noise is unknown before the first fit, so start from 1.
+        let noise = match error_model {
+            ErrorModel::OutputError => noise,
+            ErrorModel::InverseDynamics => vec![1.0; declared.joints],
         };
-        let shooting = space.shooting(logs, cut(logs, window_s), &noise, &sign_widths);
+        let shooting =
+            error_model.shooting(logs, cut(logs, window_s), &noise, &smoothing_velocities);
         let shooting = shooting.near(declared);
         Self {
             declared,
             library,
-            space,
+            error_model,
             settings,
             logs,
             audits: Arc::new(audits.into()),
-            sign_widths,
+            smoothing_velocities,
             sample: Sample::of(&shooting, sample_windows),
             shooting,
             top_speed,
@@ -146,13 +154,13 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// In how many parts models are judged, see [`Space::parts`].
+    /// In how many parts models are judged, see [`ErrorModel::parts`].
     pub(super) fn parts(&self) -> usize {
-        self.space.parts(self.declared.joints)
+        self.error_model.parts(self.declared.joints)
     }
 
-    /// The joints in the order of what the logs hold of them: random draws that take them so do not depend on how the
-    /// model numbers them.
+    /// The joints in the order of their logged motion: random draws in this order do not depend on how the model
+    /// numbers them.
     pub(super) fn joints_by_motion(&self) -> Vec<usize> {
         let motion = |joint: usize| self.logs.iter().flat_map(move |log| &log.q[joint]);
         let mut joints: Vec<usize> = (0..self.declared.joints).collect();
@@ -170,24 +178,29 @@ impl<'a> Problem<'a> {
         self.library.effects()
     }
 
-    /// The same model on other logs of the same rig: noise, speeds and the width of friction's reversal stay.
+    /// The same model on other logs of the same rig: noise, speeds and smoothing velocities stay.
     pub fn on<'b>(&self, logs: &'b [Log]) -> Problem<'b>
     where
         'a: 'b,
     {
         let windows = cut(logs, self.settings.fit.window_s);
         let shooting = self
-            .space
-            .shooting(logs, windows, &self.shooting.noise, &self.sign_widths)
+            .error_model
+            .shooting(
+                logs,
+                windows,
+                &self.shooting.noise,
+                &self.smoothing_velocities,
+            )
             .near(self.declared);
         Problem {
             declared: self.declared,
             library: self.library,
-            space: self.space,
+            error_model: self.error_model,
             settings: self.settings,
             logs,
             audits: Arc::default(),
-            sign_widths: self.sign_widths.clone(),
+            smoothing_velocities: self.smoothing_velocities.clone(),
             top_speed: self.top_speed.clone(),
             top_torque: self.top_torque.clone(),
             top_driving: self.top_driving.clone(),
@@ -199,7 +212,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same problem over other windows of its logs, or with another noise of its joints.
+    /// The same problem over other windows of its logs, or with other noise on its joints.
     pub(super) fn over(&self, shooting: Shooting<'a>) -> Self {
         Self {
             sample: Sample::of(&shooting, self.settings.fit.sample_windows),
@@ -208,7 +221,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same problem, of which this is known.
+    /// The same problem with this identifiability known.
     pub(super) fn knowing(&self, identifiability: Identifiability) -> Self {
         Self {
             identifiability,
@@ -216,11 +229,11 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same problem where dry friction reverses over these speeds. Of torques the logs are smoothed with it: they need other
-    /// windows as well.
-    pub(super) fn with_sign_widths(&self, sign_widths: Vec<f64>) -> Self {
+    /// The same problem with these smoothing velocities. For torques the logs are smoothed with them, so they need
+    /// other windows as well.
+    pub(super) fn with_smoothing_velocities(&self, smoothing_velocities: Vec<f64>) -> Self {
         Self {
-            sign_widths,
+            smoothing_velocities,
             ..self.clone()
         }
     }
@@ -230,7 +243,7 @@ impl<'a> Problem<'a> {
         self.shooting.cut_into(length_s)
     }
 
-    /// The declared model at the values that its fit began with.
+    /// The declared model at the starting values of its fit.
     pub(super) fn started_from(&self) -> Model {
         let mut model = self.declared.clone();
         for parameter in &mut model.parameters {
@@ -263,13 +276,13 @@ impl<'a> Problem<'a> {
     pub fn refit(
         &self,
         model: &Model,
-        locals: Vec<Vec<f64>>,
+        start_states: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
         let model = self.smoothed(model);
-        let dynamics = self.space.compile(&model);
+        let dynamics = self.error_model.compile(&model);
         let active = self.active(&dynamics);
-        let found = fit(&self.shooting, &dynamics, &active, locals, scale)?;
+        let found = fit(&self.shooting, &dynamics, &active, start_states, scale)?;
         Ok(Fitted::new(&model, &dynamics, found, self.logs))
     }
 
@@ -278,11 +291,11 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// As [`Problem::fit_declared`].
     pub fn estimate(&self, fitted: &Fitted) -> Result<Fitted, FitError> {
-        self.refit(&fitted.model, fitted.fit.locals.clone(), None)
+        self.refit(&fitted.model, fitted.fit.start_states.clone(), None)
     }
 
-    /// Fit a model with these effects in place of its own, starting from its values, at its scale of the residuals: the
-    /// losses of the two can be compared.
+    /// Fit a model with these effects in place of its own, starting from its values, at its scale of the residuals, so
+    /// that the losses of the two can be compared.
     ///
     /// # Errors
     /// As [`Problem::fit_declared`].
@@ -291,12 +304,16 @@ impl<'a> Problem<'a> {
         fitted: &Fitted,
         effects: Vec<FittedEffect>,
     ) -> Result<Fitted, FitError> {
-        let (locals, scale) = (fitted.fit.locals.clone(), fitted.fit.scale);
-        self.refit(&fitted.model.with_effects(effects), locals, Some(scale))
+        let (start_states, scale) = (fitted.fit.start_states.clone(), fitted.fit.scale);
+        self.refit(
+            &fitted.model.with_effects(effects),
+            start_states,
+            Some(scale),
+        )
     }
 
-    /// As [`Problem::with_effects`], where only a loss below `below` is of use: `None` if the model cannot be fitted or does
-    /// not come down to it.
+    /// As [`Problem::with_effects`], if only a loss below `below` is of use: `None` if the model cannot be fitted or
+    /// does not reach it.
     pub(super) fn with_better_effects(
         &self,
         fitted: &Fitted,
@@ -304,10 +321,10 @@ impl<'a> Problem<'a> {
         below: f64,
     ) -> Option<Fitted> {
         let model = self.smoothed(&fitted.model.with_effects(effects));
-        let dynamics = self.space.compile(&model);
-        let (active, locals) = (self.active(&dynamics), fitted.fit.locals.clone());
+        let dynamics = self.error_model.compile(&model);
+        let (active, start_states) = (self.active(&dynamics), fitted.fit.start_states.clone());
         let aim = (fitted.fit.scale, below);
-        let found = fit_below(&self.shooting, &dynamics, &active, locals, aim).ok()??;
+        let found = fit_below(&self.shooting, &dynamics, &active, start_states, aim).ok()??;
         Some(Fitted::new(&model, &dynamics, found, self.logs))
     }
 
@@ -318,14 +335,14 @@ impl<'a> Problem<'a> {
         self.with_effects(fitted, effects)
     }
 
-    /// Places of the effects that a model has and the declared model has not.
+    /// Places of the effects that a model has and the declared model lacks.
     pub fn added(&self, model: &Model) -> Range<usize> {
         self.declared.effects.len()..model.effects.len()
     }
 
     /// A model with the problem's smoothing of friction.
     pub(super) fn smoothed(&self, model: &Model) -> Model {
-        model.with_sign_widths(self.sign_widths.clone())
+        model.with_smoothing_velocities(self.smoothing_velocities.clone())
     }
 
     /// A fitted model with more effects, compiled with the problem's smoothing of friction.
@@ -336,11 +353,11 @@ impl<'a> Problem<'a> {
 
     /// A model compiled for the errors that the problem compares, with its smoothing of friction.
     pub(super) fn compiled(&self, model: &Model) -> Dynamics {
-        self.space.compile(&self.smoothed(model))
+        self.error_model.compile(&self.smoothed(model))
     }
 
-    /// Whether the logs determine a parameter: other values are not told from one that they do not.
-    pub(super) fn is_told(&self, parameter: usize) -> bool {
+    /// Whether the logs determine a parameter; if not, they do not distinguish its value from others.
+    pub(super) fn is_identifiable(&self, parameter: usize) -> bool {
         !self.identifiability.hold.contains(&parameter)
     }
 

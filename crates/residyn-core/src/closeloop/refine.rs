@@ -1,17 +1,18 @@
 //! Stage 7: estimate the declared and the chosen model in fine steps.
 
+use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::judge::Found;
 use super::problem::Problem;
 use super::settings::RefineSettings;
-use super::space::Space;
 use super::stage::{Stage, Watch};
 use crate::identify::{
-    BodiesTold, FitError, Identifiability, Uncertainty, Values, bodies_told, uncertainty,
+    FitError, Identifiability, IdentifiableBodies, Uncertainty, Values, identifiable_bodies,
+    uncertainty,
 };
 use crate::model::Model;
 
-/// The declared and the chosen model, both estimated in the same steps: in fine ones or, where either estimate failed, in
+/// The declared and the chosen model, both estimated in the same steps: in fine ones or, if either estimate failed, in
 /// those that effects were selected with. Their errors differ by the effects alone.
 pub struct Refined<'a> {
     /// The training logs in these steps.
@@ -22,35 +23,36 @@ pub struct Refined<'a> {
     pub after: Fitted,
     /// What the logs determine.
     pub identifiability: Identifiability,
-    /// Of the bodies of a chain, where torques were compared.
-    pub bodies: BodiesTold,
+    /// What the logs determine of a chain's bodies, if torques were compared.
+    pub bodies: IdentifiableBodies,
     /// How well the fit of the chosen model determines its values.
     pub uncertainty: Uncertainty,
     /// Why the steps are not fine, if they are not.
     pub failure: Option<FitError>,
 }
 
-/// Estimate the declared and the chosen model in fine steps, or with the noise of the torques that the chosen one leaves.
+/// Estimate the declared and the chosen model in fine steps or, for torques, with the noise that the chosen model
+/// leaves.
 pub fn refine<'a>(found: &Found<'a>, watch: &dyn Watch) -> Refined<'a> {
     watch.see(Stage::Refine.into());
     refined(&found.problem, &found.before, &found.chosen.after)
 }
 
-/// The same of any two models.
+/// The same for any two models.
 pub(super) fn refined<'a>(
     problem: &Problem<'a>,
     declared: &Fitted,
     chosen: &Fitted,
 ) -> Refined<'a> {
-    let mut fine = match problem.space {
-        Space::Motion => problem.refined(),
-        Space::Torque => problem.weighed_by(chosen),
+    let mut fine = match problem.error_model {
+        ErrorModel::OutputError => problem.refined(),
+        ErrorModel::InverseDynamics => problem.weighed_by(chosen),
     };
     let mut identifiability = problem.identifiability.clone();
     let (problem, before, mut after, failure) = loop {
         match rayon::join(|| fine.estimate(declared), || fine.estimate(chosen)) {
             (Ok(before), Ok(after)) => {
-                // What a single stretch tells is not determined: another one might tell otherwise.
+                // A value that rests on a single block is not determined: another block might give another value.
                 let Some(open) = fine.open_in(&after) else {
                     break (fine, before, after, None);
                 };
@@ -64,7 +66,7 @@ pub(super) fn refined<'a>(
         }
     };
     let uncertainty = uncertainty(&problem.shooting, &after.fit);
-    let bodies = problem.told_of_bodies(&after, &uncertainty);
+    let bodies = problem.identifiable_bodies(&after, &uncertainty);
     after.model = with_intervals(&problem, &after, &uncertainty, &chosen.model);
     Refined {
         bodies,
@@ -78,25 +80,30 @@ pub(super) fn refined<'a>(
 }
 
 impl<'a> Problem<'a> {
-    /// The same problem in finer steps, to estimate a model that has been chosen. A width of friction's reversal that
-    /// the model file gives stays, and so do parameters that the logs do not determine: the intervals of the others are
-    /// relative to them.
+    /// The same problem in finer steps, to estimate a model that has been chosen. Smoothing velocities that the model
+    /// file gives stay, and so do parameters that the logs do not determine: the intervals of the others are relative
+    /// to them.
     pub fn refined(&self) -> Self {
         let RefineSettings {
             step_s,
-            sign_width_factor: narrower,
+            smoothing_velocity_factor: narrower,
         } = self.settings.refine;
-        let narrower = self.declared.sign_width.as_ref().map_or(narrower, |_| 1.0);
-        let of_joint =
-            |(width, top): (&f64, &f64)| match *width > self.settings.fit.sign_width_share * top {
-                // Friction of the rig reverses over it.
-                true => *width,
-                false => narrower * width,
-            };
-        let widths = self.sign_widths.iter().zip(&self.top_speed);
-        let sign_widths: Vec<f64> = widths.map(of_joint).collect();
+        let narrower = self
+            .declared
+            .smoothing_velocity
+            .as_ref()
+            .map_or(narrower, |_| 1.0);
+        let of_joint = |(width, top): (&f64, &f64)| match *width
+            > self.settings.fit.smoothing_velocity_share * top
+        {
+            // The rig's friction reverses over this width.
+            true => *width,
+            false => narrower * width,
+        };
+        let widths = self.smoothing_velocities.iter().zip(&self.top_speed);
+        let smoothing_velocities: Vec<f64> = widths.map(of_joint).collect();
         Self {
-            sign_widths,
+            smoothing_velocities,
             held: self.identifiability.hold.clone(),
             shooting: self.shooting.clone().in_steps_of(step_s),
             ..self.clone()
@@ -105,28 +112,32 @@ impl<'a> Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// What the logs tell of the bodies of a chain.
-    fn told_of_bodies(&self, fitted: &Fitted, uncertainty: &Uncertainty) -> BodiesTold {
-        if self.space == Space::Motion {
-            return BodiesTold::default();
+    /// What the logs determine of a chain's bodies.
+    fn identifiable_bodies(
+        &self,
+        fitted: &Fitted,
+        uncertainty: &Uncertainty,
+    ) -> IdentifiableBodies {
+        if self.error_model == ErrorModel::OutputError {
+            return IdentifiableBodies::default();
         }
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
-        bodies_told(&dynamics, self.declared, &values, &fitted.fit, uncertainty)
+        identifiable_bodies(&dynamics, self.declared, &values, &fitted.fit, uncertainty)
     }
 
-    /// The same problem where the noise of each joint is what a model leaves.
+    /// The same problem with each joint's noise as a model leaves it.
     fn weighed_by(&self, fitted: &Fitted) -> Self {
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
-        let noise = (self.shooting).left_by(&dynamics, &values, &fitted.fit.locals);
+        let noise = (self.shooting).left_by(&dynamics, &values, &fitted.fit.start_states);
         self.over(self.shooting.with_noise(&noise))
     }
 }
 
-/// A fitted model with its 95 % intervals; parameters that were not free have none. An interval reaches as much further
-/// as the value was off in `coarse` numbers: smoothing and steps err to first order, so that what halving them changes is
-/// what is left of their error (Richardson 1911).
+/// A fitted model with its 95 % intervals; parameters that were not free have none. Each interval is widened by the
+/// change from the `coarse` value: smoothing and steps err to first order, so the change on halving them equals the
+/// error that is left (Richardson 1911).
 pub fn with_intervals(
     problem: &Problem<'_>,
     fitted: &Fitted,

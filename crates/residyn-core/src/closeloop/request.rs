@@ -1,6 +1,6 @@
+use super::error_model::ErrorModel;
 use super::learn::ResidualLearner;
 use super::settings::Settings;
-use super::space::Space;
 use super::split::Split;
 use crate::data::Log;
 use crate::model::{Library, Model};
@@ -17,25 +17,25 @@ pub struct Request<'a> {
     /// Models to score as they are on the same test logs.
     pub against: Vec<Reference>,
     pub settings: Settings,
-    /// Which errors to compare; without it, those that say more about these logs.
-    pub space: Option<Space>,
+    /// Which errors to compare; if not given, those that say more about these logs.
+    pub error_model: Option<ErrorModel>,
     /// Trains the residual network; without it there is none.
     pub learner: Option<&'a dyn ResidualLearner>,
 }
 
-/// What a request learns from and is judged by.
+/// The logs that a request learns from and is judged by.
 #[derive(Debug, Clone)]
 pub enum Logs {
-    /// Some are set apart for the test as `settings.split` says when the loop is closed.
+    /// Some are set apart for the test, as `settings.split` says, when the loop is closed.
     Together(Vec<Log>),
     /// They are divided already.
     Divided(Split),
 }
 
-/// A model that is scored as it is, beside those that are fitted.
+/// A model that is scored as it is, next to the fitted models.
 #[derive(Debug, Clone)]
 pub struct Reference {
-    /// As the user calls it.
+    /// The user's name for it.
     pub name: String,
     /// With the same joints as the declared model.
     pub model: Model,
@@ -47,8 +47,8 @@ impl<'a> Request<'a> {
         Self::on(model, library, Logs::Divided(split))
     }
 
-    /// The same on logs of which some are set apart for the test, by the settings that the request has when the loop is
-    /// closed.
+    /// The same with undivided logs: some are set apart for the test by the settings that the request has when the loop
+    /// is closed.
     pub fn of(model: &'a Model, library: &'a Library, logs: Vec<Log>) -> Self {
         Self::on(model, library, Logs::Together(logs))
     }
@@ -60,12 +60,12 @@ impl<'a> Request<'a> {
             logs,
             against: Vec::new(),
             settings: Settings::default(),
-            space: None,
+            error_model: None,
             learner: None,
         }
     }
 
-    /// Divide the logs, as the settings say where the user has not done so.
+    /// Divide the logs as the settings say, if the user has not done so.
     pub(super) fn divided(&mut self) -> Split {
         match std::mem::replace(&mut self.logs, Logs::Together(Vec::new())) {
             Logs::Together(logs) => Split::of(logs, &self.settings.split),

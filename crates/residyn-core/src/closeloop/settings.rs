@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sim::FINE_FIT_S;
 
-/// Declares a struct of settings, each default beside its reason.
+/// Declares a struct of settings, each default next to its reason.
 macro_rules! settings {
     ($(#[$about:meta])* $name:ident {
         $($(#[$doc:meta])* $field:ident: $kind:ty = $default:expr,)*
@@ -39,13 +39,13 @@ impl ScoreSettings {
 }
 
 impl SelectSettings {
-    /// Effects of one set at most, in a model of so many joints.
+    /// The largest number of effects in one set, in a model with this many joints.
     pub(super) fn most_effects_of(&self, joints: usize) -> usize {
         self.most_effects.max(self.most_effects_per_joint * joints)
     }
 }
 
-/// How the loop is closed.
+/// These settings say how the loop is closed.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[non_exhaustive]
 pub struct Settings {
@@ -53,7 +53,7 @@ pub struct Settings {
     pub fit: FitSettings,
     pub select: SelectSettings,
     pub establish: EstablishSettings,
-    pub remainder: RemainderSettings,
+    pub diagnostics: DiagnosticsSettings,
     pub curves: CurveSettings,
     pub proposal: ProposalSettings,
     pub notes: NoteSettings,
@@ -66,367 +66,387 @@ pub struct Settings {
 }
 
 settings! {
-    /// Stage 1: which logs are set apart.
+    /// Stage 1 sets the test logs apart.
     SplitSettings {
-        /// Share of the logs, or of each log, that is kept for the test.
+        /// This share of the logs, or of each log, is kept for the test.
         test_share: f64 = 0.25,
-        /// From this many logs on, whole logs are kept for the test. Of fewer the end of each is, since a whole one would be too
-        /// large a part of them.
+        /// With at least this many logs, whole logs are kept for the test. With fewer, the end of each log is kept,
+        /// since a whole log would be too large a part of the data.
         whole_logs_from: usize = 3,
-        /// Time in s between what is learned from and what it is judged on, where both come from one log: longer than
-        /// the memory of a drive.
+        /// Training and test data that come from one log are separated by this time in s: longer than the memory of a
+        /// drive.
         gap_s: f64 = 0.5,
-        /// Shortest time in s that the end of a log is judged on: two windows of 0.5 s.
+        /// The test at the end of a log lasts at least this time in s: two windows of 0.5 s.
         shortest_test_s: f64 = 1.0,
-        /// Largest share of a log that goes into the gap and the test together: a short log is to leave something to learn from.
+        /// The gap and the test together take at most this share of a log: a short log must leave something to learn
+        /// from.
         largest_share: f64 = 0.5,
     }
 }
 
 settings! {
-    /// Stage 3: how models are fitted.
+    /// Stage 3 fits the models.
     FitSettings {
-        /// Length in s of the windows of the first fit: even a poor start does not diverge in them.
+        /// The windows of the first fit have this length in s: even a poor start does not diverge in them.
         short_window_s: f64 = 0.15,
-        /// Length in s of the windows over which models are fitted and compared: most effects show in them.
+        /// Models are fitted and compared over windows of this length in s: most effects show in them.
         window_s: f64 = 0.5,
-        /// Windows on which the starting points of a candidate are compared, spread evenly over the logs.
+        /// The starting points of a candidate are compared on this many windows, spread evenly over the logs.
         sample_windows: usize = 24,
-        /// Share of a joint's top speed in the logs over which dry friction is smoothed: a joint that sticks creeps at
-        /// most at such a speed, a milliradian in half a second on a lab rig. A share, so that the width means the
-        /// same on a slow axis and on a fast arm.
-        sign_width_share: f64 = 5e-4,
-        /// Shares of a joint's top speed that are tried as wider smoothings of dry friction: with the usual friction where torques
-        /// are compared, which are smoothed like the motion, and with the chosen effects where the motion is, since the friction of
-        /// some rigs reverses over such widths.
+        /// Dry friction is smoothed over this share of a joint's top speed in the logs: a sticking joint creeps at most
+        /// at this speed, a milliradian in half a second on a lab rig. As a share, the width means the same on a slow
+        /// axis and on a fast arm.
+        smoothing_velocity_share: f64 = 5e-4,
+        /// These shares of a joint's top speed are tried as wider smoothing velocities of dry friction: with the
+        /// baseline friction if torques are compared, which are smoothed like the motion, and with the chosen effects
+        /// if the motion is, since friction on some rigs reverses over such widths.
         wider_sign_shares: [f64; 5] = [5e-4, 5e-3, 1e-2, 2e-2, 5e-2],
-        /// Torques are compared, not the motion, where the share of the motion that stays unexplained is this many times that of the
-        /// torques. Arms under stiff position control are at 34 and more, pendulums below 1.
+        /// Torques are compared instead of the motion if the unexplained share of the motion is at least this many
+        /// times that of the torques. Arms under stiff position control are at 34 and more, pendulums below 1.
         motion_over_torque: f64 = 10.0,
-        /// Most joints of a model whose errors of the motion are looked at to choose between motion and torques; with more, a fit of
-        /// the motion takes minutes before any search begins, and torques are compared.
+        /// Up to this many joints, the errors of the motion are examined to choose between motion and torques; with
+        /// more joints, a fit of the motion takes minutes before any search begins, and torques are compared.
         most_joints_by_motion: usize = 3,
-        /// Share of the farthest way of a joint in a window (as squares) below which the joint is at rest there: shares of a way
-        /// that is no way say nothing.
+        /// A joint is at rest in a window if it moves less than this share of its farthest travel in any window (as
+        /// squares): errors relative to no travel are meaningless.
         at_rest_share: f64 = 1e-2,
-        /// Starting values that are tried of a model that diverges with those in its file, before it is said that none works.
+        /// If a model diverges with the starting values in its file, up to this many others are tried before it is
+        /// reported that none works.
         most_starts: u32 = 512,
-        /// Factor, up or down, by which the values of the last of these starts are off.
+        /// The last starting values that are tried for a diverging model are off by up to this factor, up or down.
         farthest_start: f64 = 10.0,
-        /// Fits from such starts of which the best counts: one alone may end in a local minimum.
+        /// A model that diverges with the starting values in its file is fitted from this many others, and the best fit
+        /// is kept: a single fit may end in a local minimum.
         fitted_starts: usize = 3,
     }
 }
 
 settings! {
-    /// Stage 4: which sets of effects are tried, and which one is chosen.
+    /// Stage 4 tries sets of effects and chooses one.
     SelectSettings {
-        /// Most effects of one set in a model of few joints; `most_effects_per_joint` allows more in one of many.
+        /// A set has at most this many effects in a model of few joints; `most_effects_per_joint` allows more in a
+        /// model of many.
         most_effects: usize = 12,
-        /// Most effects of one set for each joint of the model, where that is more than `most_effects`.
+        /// A set has at most this many effects per joint of the model, if that is more than `most_effects`.
         most_effects_per_joint: usize = 4,
-        /// Most logs in which effects with a value for each log are looked for: the time for one set grows with the
-        /// third power of its values.
+        /// Effects with a value for each log are considered for at most this many logs: the time for one set grows with
+        /// the cube of the number of its values.
         most_logs_of_own_values: usize = 64,
-        /// Most steps of the beam search over predicted losses, each of which adds or drops one effect.
+        /// The beam search over predicted losses takes at most this many steps, each of which adds or drops one effect.
         beam_steps: usize = 12,
-        /// Sets that lead from one step of the beam search to the next.
+        /// Each step of the beam search passes this many sets on to the next.
         beam_width: usize = 4,
-        /// Sets of a round that are fitted, after all have been compared by predicted loss.
+        /// In each round, this many sets are fitted after all have been compared by predicted loss.
         fitted_sets: usize = 8,
-        /// Sets of a round, the most promising first, that are fitted to the end; the others only while they may still do better than
-        /// these.
+        /// In each round, this many sets, the most promising first, are fitted to the end; the others only while they
+        /// may still do better than these.
         fitted_to_the_end: usize = 2,
-        /// Most rounds of prediction and fits.
+        /// The search takes at most this many rounds of prediction and fits.
         most_rounds: usize = 8,
-        /// Share by which a round must lower the loss on left-out stretches for another one to follow.
+        /// A round must lower the loss on left-out blocks by this share for another round to follow.
         round_gain: f64 = 0.02,
-        /// Share of the loss on left-out stretches from which on a round that lowers it by so much is taken as it is. After a smaller
-        /// gain exchanges are tried before anything is added.
+        /// A round that lowers the loss on left-out blocks by this share is taken as it is. After a smaller gain,
+        /// exchanges are tried before anything is added.
         large_gain: f64 = 0.5,
-        /// Share by which an exchange of one effect for another must lower the loss on left-out stretches: more than fits that end
-        /// early err.
+        /// An exchange of one effect for another must lower the loss on left-out blocks by this share: more than the
+        /// error of fits that end early.
         exchange_gain: f64 = 0.003,
-        /// Exchanges that leave a set as good with as many values, and are looked at for effects that they make needless.
+        /// Of the exchanges that leave a set as good with as many values, this many are checked for effects that they
+        /// make redundant.
         simplified_exchanges: usize = 4,
-        /// Standard errors by which a set may raise the open-loop error on left-out stretches and still be chosen. One that raises it
-        /// by more, and by more than `worse_share`, is not, however much it lowers the loss.
+        /// A set that raises the open-loop error on left-out blocks by more than this many standard errors, and by more
+        /// than `worse_share`, is not chosen, however much it lowers the loss.
         worse_standard_errors: f64 = 1.0,
-        /// Share of its square by which a set may raise the open-loop error on left-out stretches and still be chosen; see
-        /// `worse_standard_errors`.
+        /// A set that raises the squared open-loop error on left-out blocks by more than this share, and by more than
+        /// `worse_standard_errors`, is not chosen.
         worse_share: f64 = 0.02,
-        /// Share by which the loss on left-out stretches may rise, whatever its standard error, where a simpler set takes the place
-        /// of a richer one.
+        /// When a simpler set replaces a richer one, the loss on left-out blocks may rise by this share, whatever its
+        /// standard error.
         negligible_rise: f64 = 0.01,
-        /// Standard errors by which the loss on left-out stretches may rise, up to `simpler_rise`, where a simpler set takes the place
-        /// of a richer one: stretches of a log are alike, so that twice as many are asked for as by the rule of one standard error
+        /// When a simpler set replaces a richer one, the loss on left-out blocks may rise by this many standard errors,
+        /// up to `simpler_rise`: blocks of a log are alike, so this is twice what the one-standard-error rule asks
         /// (Breiman et al. 1984).
         simpler_standard_errors: f64 = 2.0,
-        /// Share by which the loss on left-out stretches may rise at most where a simpler set takes the place of a richer one: what
-        /// acts in a few fast stretches only has a large standard error. Effects that save less than this and are no more
-        /// certain than `simpler_standard_errors` raised the error on logs of other motion more often than not.
+        /// When a simpler set replaces a richer one, the loss on left-out blocks may rise by at most this share:
+        /// effects that act only in a few fast blocks have a large standard error. Effects that save less than this and
+        /// are no more certain than `simpler_standard_errors` raised the error on logs of other motion more often than
+        /// not.
         simpler_rise: f64 = 0.2,
-        /// Fewest groups of stretches that are left out of a fit together. A group is a whole log; fewer logs than this are left out in
-        /// parts.
+        /// Blocks are left out of a fit in at least this many groups. A group is a whole log; fewer logs than this are
+        /// left out in parts.
         fewest_groups: usize = 8,
-        /// Factor by which predicted losses may be wrong: what they exclude by more is not fitted.
+        /// Predicted losses may be wrong by this factor: sets that they rule out by more are not fitted.
         prediction_slack: f64 = 3.0,
-        /// Candidates that are fitted in place of each established effect.
+        /// This many candidates are fitted in place of each established effect.
         rivals_per_effect: usize = 3,
-        /// Standard errors by which the loss with a rival in place of an effect may be larger for it to explain the logs as well.
+        /// A rival that replaces an effect explains the logs as well only if the loss rises by at most this many
+        /// standard errors.
         rival_standard_errors: f64 = 2.0,
-        /// Share of what an effect saves of the loss that a rival in its place must save to explain the logs as well.
+        /// A rival that replaces an effect explains the logs as well only if it saves more than this share of the loss
+        /// that the effect saves.
         rival_saving: f64 = 0.8,
-        /// Times the loss beside an effect that a rival in its place may leave and explain the logs as well, a seventh more in error:
-        /// few stretches may fail to tell models apart of which one leaves plainly more.
+        /// A rival that replaces an effect explains the logs as well only if it leaves at most this many times the
+        /// loss, a seventh more in error: few blocks may fail to distinguish models even if one leaves plainly more.
         rival_loss: f64 = 1.3,
-        /// Share of the information on an effect that must be its own beside the rest of the set, for the logs to tell the two apart.
+        /// For the logs to distinguish an effect from the rest of a set, at least this share of the information on it
+        /// must be independent of the rest.
         own_information: f64 = 1e-4,
-        /// What is known of each value without the windows that are left out, as a share of the information of all: what they
-        /// alone determine stays where it is.
+        /// Of each value, this share of the information is taken to be known without the windows that are left out:
+        /// values that these windows alone determine stay where they are.
         kept_information: f64 = 1e-2,
-        /// Most numbers in the normal equations of all windows and candidates that are linearised at once: 2 GB. Of more candidates
-        /// those that promise most alone are kept.
+        /// The normal equations of all windows and candidates that are linearised at once hold at most this many
+        /// numbers: 2 GB. If there are more candidates, those with the largest predicted gain alone are kept.
         most_numbers: usize = 1 << 28,
     }
 }
 
 settings! {
-    /// Stage 4, second half: which of the selected effects are established.
+    /// The second half of stage 4 decides which of the selected effects are established.
     EstablishSettings {
-        /// Probability of a false alarm for one effect, over all candidates and all their starting points.
+        /// The probability of a false alarm for one effect is at most this, over all candidates and all their starting
+        /// points.
         false_alarm: f64 = 0.05,
-        /// Probability of a false alarm, without a correction for the number of candidates, at which an effect that plainly helps is
-        /// established: few stretches cannot give as small a probability as `false_alarm` over all candidates.
+        /// An effect that plainly helps is established at this probability of a false alarm, without a correction for
+        /// the number of candidates: few blocks cannot give as small a probability as `false_alarm` over all
+        /// candidates.
         uncorrected_false_alarm: f64 = 0.01,
-        /// Share by which an effect must lower the loss on left-out stretches, and thus the error by a twentieth: less
-        /// is of no use, and on real rigs it is what a wrong effect saves by imitating others.
+        /// An effect must lower the loss on left-out blocks by this share, and thus the error by a twentieth: less is
+        /// of no use, and on real rigs it is what a wrong effect saves by imitating others.
         worthwhile_gain: f64 = 0.1,
-        /// Share of the loss on stretches that it was not fitted to from which on an effect plainly helps: chance does not take away
-        /// so much.
+        /// An effect plainly helps if it lowers the loss on blocks that it was not fitted to by this share: chance does
+        /// not remove that much.
         plain_gain: f64 = 0.5,
-        /// Probability of a fall by chance up to which an effect is confirmed by the loss on the half of the stretches that its size
-        /// was not fitted to.
+        /// An effect is confirmed if the fall of the loss on the half of the blocks that its size was not fitted to has
+        /// at most this probability by chance.
         confirming_false_alarm: f64 = 0.1,
-        /// Share of the loss from which on effects that leave it do not explain an unexplained remainder that stays either: they would
-        /// mask the real cause, and none is established.
+        /// If the effects leave more than this share of the loss and an unexplained residual stays, none is
+        /// established: they would mask the real cause.
         masking_share: f64 = 0.5,
-        /// Part of an unexplained remainder that an effect must take away to be established beside it: one that takes less may be a
-        /// part of the real cause's shape.
+        /// To be established despite an unexplained residual, an effect must remove at least this share of the
+        /// residual's size: an effect that removes less may be a part of the real cause's shape.
         outweighed_share: f64 = 0.5,
-        /// Share of what the bodies' departure from the declared ones costs that a load at the tip must take away to be established.
+        /// To be established, a load at the tip must remove more than this share of the prior cost of the bodies'
+        /// departure from the declared ones.
         payload_share: f64 = 0.5,
-        /// Masses of the loads that fits of a load at the tip start from, in those of the last body: a fit from a light one may end
-        /// where the bodies stand for the load.
+        /// Fits of a load at the tip start from these masses, in multiples of the last body's mass: a fit from a light
+        /// load may end where the bodies stand for the load.
         payload_masses: [f64; 4] = [0.5, 1.0, 2.0, 4.0],
     }
 }
 
 settings! {
-    /// Stage 5: what counts as an unexplained remainder.
-    RemainderSettings {
-        /// Probability below which the remainder is significant.
+    /// Stage 5 decides what counts as an unexplained residual.
+    DiagnosticsSettings {
+        /// The unexplained residual is significant below this probability.
         significance: f64 = 0.01,
-        /// Share of the residuals' variance (or of the loss, for a probe) below which a remainder is of no practical
-        /// interest.
+        /// An unexplained residual below this share of the residuals' variance (or of the loss, for a probe) is of no
+        /// practical interest.
         noteworthy_share: f64 = 0.05,
-        /// Part of what is more than noise that a probe must save to locate the remainder.
+        /// To locate the unexplained residual, a probe must save this share of what is more than noise.
         located_share: f64 = 0.25,
-        /// Share of the declared model's residual variance above noise from which on a remainder matters that no probe locates, a
-        /// tenth of its error: less is what the smoothing of dry friction leaves.
+        /// An unexplained residual that no probe locates matters only above this share of the declared model's residual
+        /// variance above noise, a tenth of its error: the smoothing of dry friction leaves less.
         unlocated_share: f64 = 0.01,
-        /// Half periods up to which cosines over a window are slow: a force that a model lacks reaches the
+        /// Cosines over a window are slow up to this many half periods: a force that a model lacks reaches the
         /// positions through two integrations, so that little of it is left in faster ones.
         slow_waves: usize = 6,
-        /// Draws of the sensor's noise that the residuals are compared with.
+        /// The residuals are compared with this many draws of the sensors' noise.
         noise_draws: usize = 999,
-        /// Draws of the sensors' noise where torques are compared: each smooths the logs once more.
+        /// If torques are compared, this many draws of the sensors' noise are made: each smooths the logs once more.
         torque_noise_draws: usize = 299,
-        /// Step in rad (or m), and in rad/s (or m/s), by which a start state is varied for its derivative: small against what a
-        /// model's curvature shows, large against rounding.
+        /// A start state is varied by this step, in rad (or m) and in rad/s (or m/s), for its derivative: small enough
+        /// that a model's curvature does not show, large relative to rounding.
         start_step: f64 = 1e-5,
-        /// Length in s of the stretches of constant residual force: short against a swing, long enough that encoder
-        /// noise of 1 mrad makes an error of 0.3 rad/s^2.
-        stretch_s: f64 = 0.15,
+        /// The residual force is constant over blocks of this length in s: short relative to a swing, long enough that
+        /// encoder noise of 1 mrad makes an error of 0.3 rad/s^2.
+        block_s: f64 = 0.15,
     }
 }
 
 settings! {
-    /// Stage 5: smooth curves of the residual force (Eilers and Marx 1996).
+    /// Stage 5 fits smooth curves to the residual force (Eilers and Marx 1996).
     CurveSettings {
-        /// Points of a curve.
+        /// A curve has this many points.
         points: usize = 40,
-        /// Quantiles of a variable's values between which a curve covers it: beyond them samples are too few.
+        /// A curve covers a variable between these quantiles of the variable's values: beyond them samples are too few.
         quantiles: [f64; 2] = [0.01, 0.99],
-        /// Fewest stretches of two seconds that give a confidence band.
-        fewest_stretches: usize = 5,
-        /// Parts in which the stretches are left out to choose the smoothness.
+        /// A confidence band needs at least this many blocks of two seconds.
+        fewest_blocks: usize = 5,
+        /// To choose the smoothness, the blocks are left out in this many parts.
         folds: usize = 8,
-        /// Smoothness that is tried: the penalty per sample, as powers of ten.
+        /// These smoothness penalties per sample are tried, as powers of ten.
         penalty_exponents: [i32; 9] = [-6, -5, -4, -3, -2, -1, 0, 1, 2],
-        /// Rounds over the variables; the choice settles in two.
+        /// The choice of smoothness goes over the variables this many times; it settles in two.
         rounds: usize = 2,
-        /// Scales from the curves beyond which forces weigh less (Huber 1964).
+        /// Forces more than this many scales away from the curves weigh less (Huber 1964).
         huber_scales: f64 = 3.0,
     }
 }
 
 settings! {
-    /// Stage 5: a formula for the remainder.
+    /// Stage 5 proposes a formula for the unexplained residual.
     ProposalSettings {
-        /// Most terms of a formula: longer ones explain everything.
+        /// A formula has at most this many terms: longer ones explain everything.
         most_terms: usize = 3,
-        /// Terms that are fitted after all have been screened.
+        /// This many terms are fitted after all have been screened.
         fitted_terms: usize = 4,
     }
 }
 
 settings! {
-    /// What fitted models say of the logs that audits alone do not see.
+    /// Fitted models show problems of the logs that audits alone do not see.
     NoteSettings {
-        /// Share of its loss that the model leaves with all torques reversed at which they are said to be reversed: half the error.
+        /// The torques are reported as reversed if reversing all of them leaves less than this share of the loss: half
+        /// the error.
         reversed_loss: f64 = 0.25,
-        /// Share of the declared gravity in the logged torques below which, or above whose inverse, gravity is contradicted: bodies from
-        /// a drawing are off by a third, a torque without gravity by all.
+        /// Gravity is contradicted if the logged torques hold less than this share of the declared gravity, or more
+        /// than its inverse: bodies from a drawing are off by a third, a torque without gravity by all.
         least_gravity: f64 = 0.5,
-        /// Share of a joint's torque by which its gravity must vary, both as standard deviations, for the joint to tell of gravity.
+        /// The gravity torque of a joint must vary by this share of the joint's torque, both as standard deviations,
+        /// for the joint to show gravity.
         gravity_spread: f64 = 0.3,
-        /// Standard deviations of the others beyond which a residual force counts as a push.
+        /// A residual force counts as an external force beyond this many standard deviations of the others.
         push_deviations: f64 = 8.0,
-        /// Share of the joint's largest torque from which on a residual force counts as a push: less is what the smoothing of friction
-        /// leaves of a clean log.
+        /// A residual force counts as an external force above this share of the joint's largest torque: the smoothing
+        /// of friction leaves less in a clean log.
         push_torque: f64 = 0.1,
-        /// Standard deviations of the others beyond which stretches next to the strongest one belong to a push.
+        /// Blocks next to the strongest one belong to an external force beyond this many standard deviations of the
+        /// others.
         push_edge_deviations: f64 = 4.0,
-        /// Fewest stretches of a push: an end stop or a joint that sticks is over in one.
-        push_stretches: usize = 2,
+        /// An external force lasts at least this many blocks: an end stop or a joint that sticks is over in one.
+        external_force_blocks: usize = 2,
     }
 }
 
 settings! {
-    /// Stage 6: which experiments are simulated, and when one of them suffices.
+    /// Stage 6 simulates experiments and decides when one of them suffices.
     DiscriminateSettings {
-        /// Alternatives, the best ones, against which experiments are simulated: each costs as much as a few fits.
+        /// Experiments are simulated against this many of the best alternatives: each costs as much as a few fits.
         alternatives: usize = 3,
-        /// Twice the loss by which the true model must lead for the other to fall behind by two standard errors with a
-        /// probability of 95 %: the lead has the mean of half and the standard deviation of the root of this number.
+        /// Twice the lead of the true model in loss must reach this for the other model to fall behind by two standard
+        /// errors with a probability of 95 %: the lead has a mean of half this number and a standard deviation of its
+        /// square root.
         lead: f64 = 4.0 * (2.0 + 1.645) * (2.0 + 1.645),
-        /// Times the top speed of the logs beyond which motion is not what the rig was built for.
+        /// Motion beyond this many times the top speed of the logs is not what the rig was built for.
         top_speeds: f64 = 5.0,
-        /// Windows that stand for the present logs.
+        /// This many windows stand for the present logs.
         present_windows: usize = 40,
-        /// Position in rad (or m) than which none is measured more finely.
+        /// No position is measured more finely than this, in rad (or m).
         finest_position: f64 = 1e-6,
-        /// Scale of the residuals in refits: so large that the robust loss is plain least squares.
+        /// Refits use this scale of the residuals: so large that the robust loss is plain least squares.
         refit_scale: f64 = 100.0,
-        /// Step in s below which logs are taken to be sampled as fast as the encoder can be read.
+        /// Logs with a step below this, in s, are taken to be sampled as fast as the encoder can be read.
         fastest_sampling_s: f64 = 4e-3,
-        /// Length in s of a motion: long enough for another torque to show, short enough that no controller is missed.
+        /// A motion lasts this time in s: long enough for another torque to show, short enough that it needs no
+        /// controller.
         motion_s: f64 = 2.0,
-        /// Period of the torque ramps in s.
+        /// The torque ramps have this period in s.
         ramp_period_s: f64 = 8.0,
-        /// Motions of one experiment.
+        /// An experiment has this many motions.
         motions: usize = 10,
-        /// Time in s for which the rig stands between the motions of one log, under the torque that the next begins with: longer than
-        /// any memory of its drive.
+        /// Between the motions of one log the rig stands for this time in s, under the torque that the next motion
+        /// begins with: longer than any memory of its drive.
         pause_s: f64 = 2.0,
-        /// Most rows of a motion: logs may be denser than any motion needs.
+        /// A motion has at most this many rows: logs may be denser than any motion needs.
         most_rows: f64 = 1e5,
-        /// Share of a parameter that a known payload adds to it.
+        /// A known payload adds this share to a parameter.
         payload_share: f64 = 0.5,
-        /// Length in s below which experiments are equally short.
+        /// Experiments shorter than this, in s, are equally short.
         equally_short_s: f64 = 10.0,
-        /// Longest time in s that anybody records to tell two explanations apart.
+        /// Nobody records for longer than this, in s, to distinguish two explanations.
         longest_s: f64 = 600.0,
-        /// Share of the noise below which a difference is less than what every model gets wrong.
+        /// A difference below this share of the noise is less than what every model gets wrong.
         visible_share: f64 = 0.1,
     }
 }
 
 settings! {
-    /// Stage 7: the final estimate. Smoothing and steps shift dry friction by a few parts in a thousand, more than the
-    /// noise of long logs does.
+    /// Stage 7 computes the final estimate. Smoothing and integration steps shift dry friction by a few parts in a
+    /// thousand, more than the noise of long logs does.
     RefineSettings {
-        /// Longest step of the integrator in s: half a millisecond.
+        /// The longest step of the integrator is this, in s: half a millisecond.
         step_s: f64 = FINE_FIT_S,
-        /// Share of the width that effects were selected with over which dry friction is smoothed, unless the model
-        /// file gives the width.
-        sign_width_factor: f64 = 0.5,
+        /// Dry friction is smoothed over this share of the width that effects were selected with, unless the model file
+        /// gives the width.
+        smoothing_velocity_factor: f64 = 0.5,
     }
 }
 
 settings! {
-    /// Stage 8: how the residual network is trained.
+    /// Stage 8 trains the residual network.
     LearnSettings {
-        /// Time in s within which rows are averaged: the network is to learn a force, not the encoder's noise.
+        /// Rows are averaged over this time in s: the network is to learn a force, not the encoder's noise.
         step_s: f64 = 0.01,
-        /// Steps that a segment unrolls.
+        /// A segment unrolls this many steps.
         steps: usize = 8,
-        /// Segments, about, that are enough for a network of some hundred weights.
+        /// About this many segments are enough for a network of a few hundred weights.
         segments: usize = 1200,
-        /// Length in s of the stretches that are trained on or kept to choose the epoch.
-        stretch_s: f64 = 2.0,
-        /// Parts of the logs that are left out in turn to see whether a network helps at all.
+        /// Blocks of this length in s are trained on or kept to choose the epoch.
+        block_s: f64 = 2.0,
+        /// The logs are left out in this many parts, in turn, to see whether a network helps at all.
         check_parts: usize = 3,
-        /// Ratio of the errors with and without a network, on all left-out parts together, up to which the network is used.
+        /// A network is used up to this ratio of the errors with and without it, on all left-out parts together.
         helpful_ratio: f64 = 0.95,
-        /// Ratio of the errors with and without a network, on any left-out part, above which no network is used.
+        /// No network is used above this ratio of the errors with and without it, on any left-out part.
         harmful_ratio: f64 = 1.02,
-        /// Stretches of which one is kept to choose the epoch.
+        /// One in this many blocks is kept to choose the epoch.
         validation_every: usize = 5,
-        /// Passes over all segments.
+        /// Training makes this many passes over all segments.
         epochs: usize = 250,
-        /// Step size of Adam (Kingma and Ba 2015).
+        /// Adam (Kingma and Ba 2015) takes this step size.
         learning_rate: f64 = 0.003,
-        /// Penalty on the network's output: it takes over only what pays for it.
+        /// The network's output has this penalty: it takes over only what pays for it.
         alpha: f64 = 1e-3,
-        /// Epochs from one entry of the training's history to the next.
+        /// The training's history has one entry per this many epochs.
         record_every: NonZeroUsize = const { NonZeroUsize::new(10).unwrap() },
     }
 }
 
 settings! {
-    /// Stage 9: how models are scored.
+    /// Stage 9 scores the models.
     ScoreSettings {
-        /// Horizons of the reported errors in s; models are compared in one number at the middle one. Those that are
+        /// Errors are reported at these horizons in s; models are compared in one number at the middle one. Horizons
         /// longer than any test log are left out.
         horizons_s: Vec<f64> = vec![0.1, 0.5, 1.0],
-        /// Time in s, from the beginning of a test log, on which its sensors' zeros are estimated where they differ from log to log:
+        /// Sensor zeros that differ from log to log are estimated on this time in s from the beginning of a test log:
         /// what a user gets who zeroes the rig before a run.
         zeroed_on_s: f64 = 1.0,
-        /// Test logs from which on whole ones are resampled for intervals; of fewer, stretches of two seconds are.
+        /// With at least this many test logs, whole logs are resampled for intervals; with fewer, blocks of two seconds
+        /// are.
         whole_logs_from: usize = 5,
-        /// Fewest logs or stretches that give an interval.
+        /// An interval needs at least this many logs or blocks.
         fewest_blocks: usize = 3,
-        /// Most training logs to each of which the chosen model is fitted alone: the time grows with them.
+        /// The chosen model is fitted to each training log alone for at most this many logs: the time grows with them.
         most_logs_fitted_alone: usize = 32,
-        /// Most training logs on each of which the fits to the others are scored: the table grows with their square.
+        /// The fit to each training log is scored on the others for at most this many logs: the table grows with their
+        /// square.
         most_logs_crossed: usize = 8,
     }
 }
 
 settings! {
-    /// When the logs allow a verdict.
+    /// These settings decide when the logs allow a verdict.
     VerdictSettings {
-        /// Fewest windows that allow a conclusion.
+        /// A conclusion needs at least this many windows.
         fewest_windows: usize = 8,
-        /// Factor by which effects may raise the error on the test logs and still be trusted: noise in the
-        /// windows' start states raises it by less.
+        /// Effects may raise the error on the test logs by this factor and still be trusted: noise in the windows'
+        /// start states raises it by less.
         trusted_rise: f64 = 1.05,
     }
 }
 
 settings! {
-    /// Stage 10: what the logs can show.
+    /// Stage 10 determines what the logs can show.
     CalibrateSettings {
-        /// Standard normal quantile of the share of logs in which an effect of the smallest size is to be named: 80 %.
+        /// An effect of the smallest size is to be named in the share of logs with this standard normal quantile: 80 %.
         power_quantile: f64 = 0.841_6,
-        /// Share of the information on an effect that must be its own for the logs to tell it from the rest of the model.
+        /// For the logs to distinguish an effect from the rest of the model, at least this share of the information on
+        /// it must be independent of the rest.
         own_information: f64 = 1e-6,
-        /// Times its smallest size at which an effect is hidden.
+        /// An effect is hidden at this many times its smallest size.
         hidden_multiple: f64 = 1.5,
-        /// Pause between the windows of simulated logs, in half widths of a start state's estimate, each of four median
-        /// steps or more: windows end at pauses of five.
+        /// The windows of simulated logs are separated by this pause, in half widths of a start state's estimate, each
+        /// of four median steps or more: windows end at pauses of five.
         pause_half_widths: f64 = 1.5,
     }
 }

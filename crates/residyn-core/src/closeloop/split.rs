@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::settings::SplitSettings;
 use crate::data::{Log, row_after, row_from};
 
-/// Which logs a problem learns from and which it is judged by.
+/// The logs that a problem learns from and those that it is judged by.
 #[derive(Debug, Clone)]
 pub struct Split {
     pub train: Vec<Log>,
@@ -22,9 +22,9 @@ pub struct Split {
 pub enum SplitMethod {
     /// The user named them.
     Given,
-    /// The last logs of those given.
+    /// The last of the given logs.
     LastLogs { count: usize },
-    /// The end of every log, after a gap: the largest share of one, with the gap.
+    /// The end of every log, after a gap: the largest share of a log, including the gap.
     EndOfEachLog { share: f64, gap_s: f64 },
 }
 
@@ -38,15 +38,15 @@ impl Split {
         }
     }
 
-    /// The same with the logs in the order of their names and, where these are equal, of what they hold: sums and random
-    /// draws take them one after the other, and what is found is not to depend on the order in which they were given.
+    /// The same with the logs sorted by name and, if names are equal, by content: sums and random draws take the logs
+    /// one after the other, and the result must not depend on the order in which they were given.
     pub(super) fn in_order(mut self) -> Self {
         self.train.sort_by(by_name);
         self.test.sort_by(by_name);
         self
     }
 
-    /// Set whole trajectories apart where there are three or more, else the end of each.
+    /// Set whole trajectories apart if there are three or more, else the end of each.
     pub fn of(mut logs: Vec<Log>, settings: &SplitSettings) -> Self {
         if logs.len() >= settings.whole_logs_from {
             let count = settings.count_of(logs.len());
@@ -71,7 +71,7 @@ impl Split {
             train.push(between(&log, f64::NEG_INFINITY, middle));
             test.push(between(&log, middle + settings.gap_s, f64::INFINITY));
         }
-        // A log too short for a rest gives no test.
+        // A log too short to divide gives no test log.
         test.retain(|log| log.rows() > 1);
         Self {
             train,
@@ -85,13 +85,14 @@ impl Split {
 }
 
 impl SplitSettings {
-    /// How much of the end of a log goes into the gap and the test, in s: more of a short log, so that it can be judged.
+    /// Length of the end of a log that goes into the gap and the test, in s: a larger share of a short log, so that it
+    /// can be judged.
     fn rest_s(&self, duration_s: f64) -> f64 {
         let enough = (self.test_share * duration_s).max(self.gap_s + self.shortest_test_s);
         enough.min(self.largest_share * duration_s)
     }
 
-    /// How many of so many logs are set apart.
+    /// How many of `logs` logs are set apart.
     #[allow(
         clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
@@ -107,7 +108,7 @@ fn by_name(a: &Log, b: &Log) -> Ordering {
     a.path.cmp(&b.path).then_with(by_numbers)
 }
 
-/// The order of two channels of finite numbers by the first that differ.
+/// The order of two channels of finite numbers by the first numbers that differ.
 pub(super) fn by_numbers<'a>(
     a: impl Iterator<Item = &'a f64>,
     b: impl Iterator<Item = &'a f64>,

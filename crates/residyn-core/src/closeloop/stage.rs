@@ -11,7 +11,7 @@ pub enum Stage {
     Fit,
     Select,
     Establish,
-    Remainder,
+    Diagnostics,
     Discriminate,
     Refine,
     Learn,
@@ -25,7 +25,7 @@ impl Stage {
         Self::Fit,
         Self::Select,
         Self::Establish,
-        Self::Remainder,
+        Self::Diagnostics,
         Self::Discriminate,
         Self::Refine,
         Self::Learn,
@@ -44,7 +44,7 @@ impl Stage {
             Self::Fit => "fitting the declared model",
             Self::Select => "selecting effects",
             Self::Establish => "judging each effect",
-            Self::Remainder => "testing the residuals",
+            Self::Diagnostics => "testing the residuals",
             Self::Discriminate => "simulating experiments",
             Self::Refine => "estimating in fine steps",
             Self::Learn => "training the residual network",
@@ -59,11 +59,11 @@ impl Stage {
 pub struct Progress<'t> {
     pub stage: Stage,
     pub text: &'t str,
-    /// How much of it is done, where it is a number of models to fit.
+    /// How much of it is done, if it is a number of models to fit.
     pub fits: Option<Fits>,
 }
 
-/// Models of which some are fitted.
+/// How many of the models are fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fits {
     pub done: usize,
@@ -72,18 +72,18 @@ pub struct Fits {
 
 /// Follows the work, from any of the threads that do it, and may end the search.
 ///
-/// The library reads no clock: whoever bounds the time of a search, or measures that of its stages, does so here.
+/// The library reads no clock: whoever bounds the time of a search, or times its stages, does so here.
 pub trait Watch: Sync {
-    /// Hears what is being done.
+    /// Receives what is being done.
     fn see(&self, now: Progress<'_>);
 
-    /// Whether the search for effects is to end where it stands. Asked before each model that is fitted.
+    /// Whether the search for effects is to end now. Asked before each fit.
     fn has_to_end(&self) -> bool {
         false
     }
 }
 
-/// Nobody watches, and the search goes on to its end.
+/// Nobody watches, and the search runs to its end.
 impl Watch for () {
     fn see(&self, _: Progress<'_>) {}
 }
@@ -102,7 +102,7 @@ impl From<Stage> for Progress<'_> {
     }
 }
 
-/// How long each stage took, by the clock of whoever watches: times are from its start.
+/// How long each stage took, by the watcher's clock: times count from its start.
 #[derive(Debug)]
 pub struct StageTimes {
     now: (Stage, Duration),
@@ -120,7 +120,7 @@ impl Default for StageTimes {
 }
 
 impl StageTimes {
-    /// A stage goes on or begins; returns the one that ended with it, and when that began.
+    /// A stage continues or begins; returns the stage that thereby ended, and when that began.
     pub fn note(&mut self, stage: Stage, at: Duration) -> Option<(Stage, Duration)> {
         if stage == self.now.0 {
             return None;
@@ -129,12 +129,12 @@ impl StageTimes {
         Some(std::mem::replace(&mut self.now, (stage, at)))
     }
 
-    /// The stage that goes on, and when it began.
+    /// The current stage, and when it began.
     pub fn now(&self) -> (Stage, Duration) {
         self.now
     }
 
-    /// Time in s of each stage, in their order; the last one ends here.
+    /// Time of each stage in s, in order; the last one ends here.
     pub fn end(mut self, at: Duration) -> Vec<(Stage, f64)> {
         self.past.push(self.until(at));
         self.past

@@ -5,10 +5,10 @@ use super::settings::FitSettings;
 use crate::identify::Values;
 use crate::model::{Model, Parameter};
 
-/// In each, free parameters are spread by another base of the van der Corput sequence.
+/// Each free parameter is spread in another base of the van der Corput sequence.
 const BASES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
 
-/// The declared model at values around those in its file with which it does not diverge over short windows, the nearest
+/// The declared model at values around those in its file at which it does not diverge over short windows, nearest
 /// first.
 pub(super) fn around(problem: &Problem<'_>) -> impl Iterator<Item = Model> {
     let short = problem.windows_of(problem.settings.fit.short_window_s);
@@ -16,13 +16,13 @@ pub(super) fn around(problem: &Problem<'_>) -> impl Iterator<Item = Model> {
     spread(problem.declared, &problem.settings.fit).filter(move |model| {
         let dynamics = problem.compiled(model);
         let values = Values::of(&dynamics, problem.logs);
-        let costs = sample.costs(&dynamics, &values, &sample.initial_locals(0), 1.0);
+        let costs = sample.costs(&dynamics, &values, &sample.initial_start_states(0), 1.0);
         costs.iter().all(|cost| cost.is_finite())
     })
 }
 
-/// A model with its free parameters at other values, ever farther from its own: spread evenly in the logarithm (Halton
-/// 1960), each with the sign that it has.
+/// A model with its free parameters at values ever farther from its declared ones: spread evenly in the logarithm
+/// (Halton 1960), each keeping its sign.
 fn spread(declared: &Model, settings: &FitSettings) -> impl Iterator<Item = Model> {
     let FitSettings {
         most_starts,
@@ -40,7 +40,7 @@ fn spread(declared: &Model, settings: &FitSettings) -> impl Iterator<Item = Mode
     })
 }
 
-/// Move a value by a factor, `by` its logarithm; one at zero moves on its scale.
+/// Move a value by a factor whose logarithm is `by`; a value at zero moves on its scale.
 fn move_by(parameter: &mut Parameter, by: f64) {
     let moved = match parameter.value {
         0.0 => by * parameter.scale,
@@ -50,7 +50,7 @@ fn move_by(parameter: &mut Parameter, by: f64) {
     parameter.value = moved.clamp(low, high);
 }
 
-/// The digits of a number mirrored at the point: evenly spread over 0 to 1 however many numbers are taken.
+/// The digits of a number mirrored at the radix point: evenly spread over 0 to 1 however many numbers are taken.
 fn radical_inverse(mut number: u32, base: u32) -> f64 {
     let (mut value, mut place) = (0.0, 1.0);
     while number > 0 {

@@ -5,6 +5,7 @@ use std::path::Path;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::diagnostics::ResidualForce;
 use super::establish::{Chosen, Standing, establish};
 use super::fit::{Declared, NOTHING};
 use super::fitted::Fitted;
@@ -12,7 +13,6 @@ use super::judge::Found;
 use super::pipeline::{close_loop, find};
 use super::problem::Problem;
 use super::refine::refined;
-use super::remainder::ResidualForce;
 use super::request::Request;
 use super::score::{Scored, Scorer, findings};
 use super::select::{Selected, Trial, select, select_from};
@@ -34,7 +34,7 @@ recording = { logs = 3, duration_s = 8, start = [0, 0] }
 effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.2 }]
 "#;
 
-/// The logs of a rig of this file.
+/// The logs of the rig in this file.
 pub(super) fn recorded(rig: &str, seed: u64) -> Vec<Log> {
     let library = Library::built_in();
     let model = |name: &Path| library.model(name.to_str().unwrap());
@@ -45,7 +45,7 @@ pub(super) fn recorded(rig: &str, seed: u64) -> Vec<Log> {
         .collect()
 }
 
-/// Of a pendulum with dry friction.
+/// Logs of a pendulum with dry friction.
 pub(super) fn logs() -> Vec<Log> {
     recorded(RIG, 0)
 }
@@ -54,13 +54,13 @@ pub(super) fn pendulum() -> Model {
     Library::built_in().model("pendulum").unwrap()
 }
 
-/// An effect of the library on the first joint, at its values where it is absent.
+/// An effect of the library on the first joint, at the values at which it is absent.
 pub(super) fn absent(name: &str) -> FittedEffect {
     let library = Library::built_in();
     FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0))
 }
 
-/// A model that moves no window: its values are no numbers.
+/// A model that diverges in every window: its values are NaN.
 fn diverging(mut fitted: Fitted) -> Fitted {
     for parameter in &mut fitted.model.parameters {
         parameter.value = f64::NAN;
@@ -88,7 +88,7 @@ fn a_model_that_diverges_has_no_residual_force() {
     assert!(matches!(failed, Err(FitError::Diverged { .. })));
 }
 
-/// Of two effects the rig has one; what the other takes away is noise.
+/// The rig has one of two effects; the other removes only noise.
 #[test]
 fn an_effect_that_saves_little_is_not_established() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
@@ -96,7 +96,7 @@ fn an_effect_that_saves_little_is_not_established() {
     let problem = Problem::new(&declared, &library, &logs, &settings);
     let start = declared.with_effects(["coulomb_friction", "gravity_tilt"].map(absent).into());
     let fitted = problem
-        .refit(&start, problem.shooting.initial_locals(0), None)
+        .refit(&start, problem.shooting.initial_start_states(0), None)
         .unwrap();
     let selected = Selected {
         chosen: Ok(Trial::of(&problem, fitted.clone())),
@@ -112,7 +112,7 @@ fn an_effect_that_saves_little_is_not_established() {
             .reason
             .as_ref()
             .unwrap()
-            .contains("the loss on left-out stretches by")
+            .contains("the loss on left-out blocks by")
     );
 }
 
@@ -129,7 +129,7 @@ fn a_fit_that_fails_allows_no_verdict() {
     let finer = refined(&found.problem, &found.before, &found.chosen.after);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let models = Scored {
-        space: problem.space,
+        error_model: problem.error_model,
         declared: &declared,
         before: &finer.before,
         with_friction: None,
@@ -162,8 +162,8 @@ fn a_fit_that_fails_allows_no_verdict() {
     assert_eq!(of(&found, &finer).0, Verdict::Inconclusive);
 }
 
-/// Where a rig's torque carries a bias, the model without the effect that takes it away leaves the range in which its
-/// equations hold.
+/// If a rig's torque carries a bias, the model without the effect that removes it leaves the range in which its
+/// equations are defined.
 #[test]
 fn an_effect_stays_where_the_refit_without_it_fails() {
     let bounded = "sin(q1) * (1 + 1e-9*sqrt(3.6 - abs(q1)))";
@@ -183,8 +183,8 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     for (parameter, value) in start.parameters.iter_mut().zip([-17.4, 4.6]) {
         parameter.value = value;
     }
-    let locals = problem.shooting.initial_locals(0);
-    let chosen = problem.refit(&start, locals, None).unwrap();
+    let start_states = problem.shooting.initial_start_states(0);
+    let chosen = problem.refit(&start, start_states, None).unwrap();
     let refined = refined(&problem, &chosen, &chosen);
     let scorer = Scorer {
         test: &split.test,
@@ -229,14 +229,14 @@ fn the_error_reduction_compares_two_fits_in_the_same_steps() {
     let reported = findings(&problem, &found.chosen, &finer, &scorer);
     let reduction = *reported[0].error_reduction.as_ref().unwrap();
     let after = &found.chosen.after;
-    let (locals, scale) = (after.fit.locals.clone(), after.fit.scale);
+    let (start_states, scale) = (after.fit.start_states.clone(), after.fit.scale);
     let less = after.model.with_effects(Vec::new());
-    let less = problem.refit(&less, locals, Some(scale)).unwrap();
+    let less = problem.refit(&less, start_states, Some(scale)).unwrap();
     let error = |model: &Fitted| scorer.fitted(model).position_rms();
     assert_eq!(reduction, 1.0 - error(after) / error(&less));
 }
 
-/// No single effect helps much where both joints have friction: the four are found together.
+/// No single effect helps much if both joints have friction: the four effects are found together.
 #[test]
 fn friction_of_all_joints_is_found_at_once() {
     const RIG: &str = r#"
@@ -270,19 +270,20 @@ effect = [
     );
 }
 
-/// Where the test logs contradict the effects, something is missing if a remainder stays; else more must be known.
+/// If the test logs contradict the effects, a residual shows that something is missing; without one the verdict stays
+/// open.
 #[test]
 fn effects_that_raise_the_error_on_the_test_logs_are_doubted() {
     let (declared, library) = (pendulum(), Library::built_in());
     let outcome = |significance: f64| {
         let mut request = Request::of(&declared, &library, logs());
-        // Every effect counts as worse, and every remainder as noteworthy.
+        // Every effect counts as worse, and every residual as noteworthy.
         request.settings.verdict.trusted_rise = 0.0;
         request.settings.establish.masking_share = f64::INFINITY;
         request.settings.establish.outweighed_share = 0.0;
-        let remainder = &mut request.settings.remainder;
-        (remainder.noteworthy_share, remainder.unlocated_share) = (-1.0, -1.0);
-        remainder.significance = significance;
+        let diagnostics = &mut request.settings.diagnostics;
+        (diagnostics.noteworthy_share, diagnostics.unlocated_share) = (-1.0, -1.0);
+        diagnostics.significance = significance;
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         close_loop(request, &mut rng, &()).unwrap()
     };
@@ -297,14 +298,14 @@ fn effects_that_raise_the_error_on_the_test_logs_are_doubted() {
     assert_eq!(nothing_missing.verdict, Verdict::Inconclusive);
 }
 
-/// An effect beside a remainder that outweighs it may be a part of the real cause's shape.
+/// An effect outweighed by the unexplained residual may be a part of the real cause's shape.
 #[test]
 fn an_effect_that_a_remainder_outweighs_is_not_established() {
     let (declared, library) = (pendulum(), Library::built_in());
     let mut request = Request::of(&declared, &library, logs());
-    let remainder = &mut request.settings.remainder;
-    (remainder.noteworthy_share, remainder.unlocated_share) = (-1.0, -1.0);
-    remainder.significance = 2.0;
+    let diagnostics = &mut request.settings.diagnostics;
+    (diagnostics.noteworthy_share, diagnostics.unlocated_share) = (-1.0, -1.0);
+    diagnostics.significance = 2.0;
     request.settings.establish.outweighed_share = f64::INFINITY;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let outcome = close_loop(request, &mut rng, &()).unwrap();
@@ -314,7 +315,7 @@ fn an_effect_that_a_remainder_outweighs_is_not_established() {
     assert_eq!(outcome.verdict, Verdict::Unexplained);
 }
 
-/// Whoever watches may end the search before it has tried anything; the report says so.
+/// The watcher may end the search before it has tried anything; the report says so.
 #[test]
 fn a_search_that_is_ended_allows_no_verdict() {
     struct Ended;
@@ -382,7 +383,7 @@ fn a_search_that_begins_over_short_windows_ends_with_the_same_effects() {
     assert!((loss(&both) / loss(&long) - 1.0).abs() < 1e-3);
 }
 
-/// Torques that change from row to row, of which the logger dropped some: what the rig did then nobody knows.
+/// Torques change from row to row, and the logger dropped some rows: what the rig did then is unknown.
 #[test]
 fn windows_with_dropped_rows_do_not_count_as_unexplained() {
     const ROUGH: &str = r#"
@@ -453,8 +454,8 @@ recording = { logs = 2, duration_s = 6, start = [0, 0, 0, 0] }
     }
 }
 
-/// Three parameters of which the motion tells two combinations, inertia about the pivot and weight. A fit that begins at other
-/// values that explain the logs comes back to the nearest to the declared ones.
+/// The motion determines two combinations of three parameters, inertia about the pivot and weight. A fit that begins at
+/// other values that explain the logs returns to those nearest to the declared ones.
 #[test]
 fn what_the_logs_do_not_determine_stays_near_the_declared_values() {
     const RIG: &str = r#"
@@ -485,8 +486,8 @@ qdd1 = "(tau1 - 9.81 * m * l * sin(q1)) / (I + m * l^2)"
     for (parameter, value) in start.parameters.iter_mut().zip(far) {
         parameter.value = value;
     }
-    let locals = problem.shooting.initial_locals(0);
-    let fitted = problem.refit(&start, locals, None).unwrap();
+    let start_states = problem.shooting.initial_start_states(0);
+    let fitted = problem.refit(&start, start_states, None).unwrap();
     let [m, l, i] = fitted.model.values()[..] else {
         panic!()
     };
@@ -496,8 +497,8 @@ qdd1 = "(tau1 - 9.81 * m * l * sin(q1)) / (I + m * l^2)"
     assert_eq!(problem.identifiability_of(&fitted).determined, 2);
 }
 
-/// Without torque nothing tells inertia from friction: what is declared of the inertia is held, so that the friction of the
-/// file gets a value.
+/// Without torque, inertia and friction cannot be distinguished: the declared inertia is held, so that the file's
+/// friction gets a value.
 #[test]
 fn what_an_effect_of_the_file_is_not_told_from_is_held() {
     const RIG: &str = r#"
@@ -512,7 +513,7 @@ effect = [{ name = "viscous_friction", joint = 1, b = 0.1 }]
     declared.parameters[0].value = -15.0;
     let declared = declared.with_effects(vec![absent("viscous_friction")]);
     let (logs, settings) = (recorded(RIG, 0), Settings::default());
-    // Coulomb friction is fitted beside it at first, and counts for nothing.
+    // Coulomb friction is fitted together with it at first, and does not count.
     let problem = Problem::new(&declared, &library, &logs, &settings);
     let Declared { problem, fitted } = problem.fit_declared().unwrap();
     assert_eq!(problem.identifiability.hold, [1]);
@@ -531,9 +532,9 @@ fn a_result_predicts_a_log() {
     assert!(predicted.len() > 10);
 }
 
-/// Two joints whose torques are logged as the model means them, or the other way round.
+/// Two joints whose torques are logged with the model's sign, or reversed.
 #[test]
-fn torques_that_are_reversed_on_all_joints_are_told() {
+fn torques_that_are_reversed_on_all_joints_are_reported() {
     let rig = r#"
 model = "acrobot"
 sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
@@ -544,9 +545,9 @@ effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.5 }]
     let library = Library::built_in();
     let declared = library.model("acrobot").unwrap();
     let settings = Settings::default();
-    let told = |problem: &Problem<'_>, mut audits: Vec<Audit>| -> Vec<String> {
+    let message = |problem: &Problem<'_>, mut audits: Vec<Audit>| -> Vec<String> {
         let usual = problem.with_usual_friction();
-        problem.tell_reversed(usual.as_ref(), &mut audits);
+        problem.report_reversed(usual.as_ref(), &mut audits);
         let texts = audits[0].serious().map(ToString::to_string);
         texts
             .filter(|text| text.contains("with every tau reversed"))
@@ -559,14 +560,14 @@ effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.5 }]
     };
     let mut logs = recorded(rig, 0);
     let problem = Problem::new(&declared, &library, &logs, &settings);
-    assert!(told(&problem, blank(&problem)).is_empty());
+    assert!(message(&problem, blank(&problem)).is_empty());
     for value in logs[0].tau.iter_mut().flatten() {
         *value = -*value;
     }
     let problem = Problem::new(&declared, &library, &logs, &settings);
-    let alone = told(&problem, blank(&problem));
+    let alone = message(&problem, blank(&problem));
     assert_eq!(alone.len(), 1);
     assert!(alone[0].contains("[columns] tau = "), "{}", alone[0]);
-    // Where the audit of the log says so of each joint, there is nothing to add.
-    assert!(told(&problem, problem.audits().to_vec()).is_empty());
+    // If the log's audit already reports each joint, there is nothing to add.
+    assert!(message(&problem, problem.audits().to_vec()).is_empty());
 }

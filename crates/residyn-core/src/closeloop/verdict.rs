@@ -1,8 +1,8 @@
+use super::diagnostics::{UNKNOWN, Unexplained};
 use super::gravity::against_gravity;
 use super::judge::Found;
 use super::problem::Problem;
 use super::refine::Refined;
-use super::remainder::{UNKNOWN, Unexplained};
 use super::score::Errors;
 use crate::identify::Identifiability;
 use schemars::JsonSchema;
@@ -15,7 +15,7 @@ pub enum Verdict {
     Explained,
     /// Effects were found and something significant is left.
     PartlyExplained,
-    /// Something significant is missing and no effect of the library names it.
+    /// Something significant is missing and no effect of the library explains it.
     Unexplained,
     /// The declared model explains the logs.
     NoMissingEffect,
@@ -32,7 +32,7 @@ pub(super) fn verdict(
     let problem = &found.problem;
     let added = problem.added(&found.chosen.after.model).len();
     let established = found.chosen.established();
-    let [before, after] = errors.compared(problem.space);
+    let [before, after] = errors.compared(problem.error_model);
     let are_worse = after > problem.settings.verdict.trusted_rise * before;
     match at_rest(problem)
         .or_else(|| failure(found, refined))
@@ -54,7 +54,7 @@ pub(super) fn verdict(
 
 const STOPPED: &str = "the search was stopped when its time was spent, and more time may find a better set of effects";
 
-/// Whether there is nothing to conclude from.
+/// Why nothing can be concluded from logs in which no joint moves.
 fn at_rest(problem: &Problem<'_>) -> Option<String> {
     (!problem.moves()).then(|| {
         "no joint moves visibly in any training log: record motion before anything can be said"
@@ -62,7 +62,7 @@ fn at_rest(problem: &Problem<'_>) -> Option<String> {
     })
 }
 
-/// Which fit failed or did not converge, if one did that the verdict rests on.
+/// Which fit that the verdict rests on failed or did not converge, if any.
 fn failure(found: &Found<'_>, refined: &Refined<'_>) -> Option<String> {
     if let Some(error) = &found.chosen.failure {
         return Some(format!(
@@ -94,9 +94,10 @@ fn inconclusive(problem: &Problem<'_>, known: &Identifiability) -> Option<String
     })
 }
 
-/// The verdict on effects that raise the error on the test logs. That something is missing is sure where a remainder stays.
+/// The verdict on effects that raise the error on the test logs. Something is certainly missing if a significant
+/// residual is left.
 fn contradicted(established: usize, left: &Unexplained) -> (Verdict, String) {
-    let reason = "the effects lower the loss on left-out stretches of the training logs but raise the error on the test \
+    let reason = "the effects lower the loss on left-out blocks of the training logs but raise the error on the test \
                   logs: do not use them before logs of more varied motion confirm them";
     if !left.is_significant() {
         return (Verdict::Inconclusive, reason.into());
@@ -107,8 +108,8 @@ fn contradicted(established: usize, left: &Unexplained) -> (Verdict, String) {
 
 fn what_is_left(left: &Unexplained) -> String {
     match left.place.as_str() {
-        UNKNOWN => "an unexplained remainder depends on none of the variables tested".to_owned(),
-        place => format!("an unexplained remainder depends on {place}"),
+        UNKNOWN => "an unexplained residual depends on none of the variables tested".to_owned(),
+        place => format!("an unexplained residual depends on {place}"),
     }
 }
 
@@ -117,12 +118,12 @@ fn conclusion(added: usize, left: &Unexplained) -> (Verdict, String) {
     match (added, left.is_significant()) {
         (0, false) => (
             Verdict::NoMissingEffect,
-            "no effect of the library lowers the loss on left-out stretches".into(),
+            "no effect of the library lowers the loss on left-out blocks".into(),
         ),
         (0, true) => (
             Verdict::Unexplained,
             format!(
-                "no effect of the library lowers the loss on left-out stretches, and {what_is_left}"
+                "no effect of the library lowers the loss on left-out blocks, and {what_is_left}"
             ),
         ),
         (_, false) => (

@@ -3,10 +3,10 @@ use super::columns::Columns;
 use super::error::LogError;
 use super::log::Log;
 
-/// The channels of one trajectory in memory, as a program that recorded them itself has them: `[joint][row]`.
+/// The channels of one trajectory in memory, as held by a program that recorded them itself: `[joint][row]`.
 ///
 /// ```
-/// use residyn::{Channels, Quantity};
+/// use residyn_core::data::{Channels, Quantity};
 ///
 /// let time: Vec<f64> = (0..200).map(|row| 0.01 * f64::from(row)).collect();
 /// let angle: Vec<f64> = time.iter().map(|t| t.cos()).collect();
@@ -34,7 +34,7 @@ pub struct Channels {
 }
 
 impl Channels {
-    /// The log that a file with these columns is; `name` is for messages and for the report.
+    /// The log that a file with these columns would give; `name` is for messages and the report.
     ///
     /// # Errors
     /// As [`Log::of_table`].

@@ -13,7 +13,7 @@ pub enum Quantity {
     Angle,
     Velocity,
     Torque,
-    /// Of a drive that makes a torque of it: a position target, volts, a duty cycle, amperes.
+    /// Command of a drive that turns it into a torque: a position target, volts, a duty cycle, amperes.
     Command,
 }
 
@@ -69,7 +69,7 @@ impl Quantity {
         }
     }
 
-    /// Size of a unit in the channel's own; `None` for a unit of something else.
+    /// Size of a unit in the channel's own unit; `None` for a unit of another quantity.
     pub fn size_of(self, unit: &str) -> Option<f64> {
         let units = self.units().iter();
         units
@@ -85,14 +85,14 @@ impl Quantity {
 pub struct Column {
     /// As the header has it.
     pub name: String,
-    /// What the file's numbers are in, one of [`Quantity::units`]; `None` for the channel's own unit.
+    /// The unit of the file's numbers, one of [`Quantity::units`]; `None` for the channel's own unit.
     pub unit: Option<&'static str>,
     /// A further factor: -1 for an opposite sign, radians per count of an encoder, a gear ratio.
     pub factor: f64,
-    /// Of an angle: the file starts each full turn anew, as from -pi to pi. Full turns are then counted.
+    /// For an angle: the file wraps it at each full turn, as from -pi to pi. Full turns are then counted.
     pub wrapped: bool,
-    /// How long before the times of their rows the values were taken, s: another clock, a bus, a filter. Below zero for values
-    /// that are of a later time.
+    /// How long before the times of their rows the values were taken, s: another clock, a bus, a filter. Below zero for
+    /// values taken later.
     pub late_s: f64,
 }
 
@@ -111,7 +111,7 @@ impl Column {
     /// What a number in the file is multiplied by.
     ///
     /// # Panics
-    /// When its unit is none of the quantity's.
+    /// When its unit is not one of the quantity's.
     pub fn scale(&self, quantity: Quantity) -> f64 {
         let size = |unit| {
             quantity
@@ -158,8 +158,8 @@ impl fmt::Display for Column {
     }
 }
 
-/// Joins the turns of an angle that starts each full turn anew: a step of over half a turn is one that passes the
-/// end of the turn, as no joint turns so far from one row to the next. Returns how often it does.
+/// Unwraps an angle that starts over at each full turn: a step of over half a turn passes the end of the turn, as no
+/// joint turns that far from one row to the next. Returns how often it does.
 pub(super) fn unwrap(angles: &mut [f64], turn: f64) -> usize {
     let (mut turns, mut passed) = (0.0, 0);
     let mut before = angles.first().copied().unwrap_or(0.0);

@@ -15,16 +15,16 @@ pub struct Columns {
     pub time: Column,
     /// Joint angles, joint 1 first.
     pub q: Vec<Column>,
-    /// Joint velocities, joint 1 first; `None` where they are to come from the angles.
+    /// Joint velocities, joint 1 first; `None` if they are to come from the angles.
     pub qd: Option<Vec<Column>>,
     /// Joint torques or commands of the drives, joint 1 first.
     pub tau: Vec<Column>,
     /// Which of the two they are: [`Quantity::Torque`] or [`Quantity::Command`].
     pub driven_by: Quantity,
-    /// The topic of a recording that has the joints; `None` where their names tell.
+    /// The topic of a recording that has the joints; `None` if their names determine it.
     pub topic: Option<String>,
-    /// Names of the joints, if they have any. A standard column that a header lacks may be called by its joint's: `q_elbow`
-    /// for `q2`.
+    /// Names of the joints, if they have any. A standard column that a header lacks may go by the name of its joint:
+    /// `q_elbow` for `q2`.
     pub joint_names: Vec<String>,
 }
 
@@ -78,7 +78,7 @@ impl Columns {
         format!("{} = {value}", quantity.key())
     }
 
-    /// These columns with every empty list filled with the standard names; `None` where a list has another length.
+    /// These columns with every empty list filled with the standard names; `None` if a list has another length.
     pub(super) fn whole(&self, joints: usize) -> Option<Columns> {
         self.completed(joints, Path::new("")).ok()
     }
@@ -106,7 +106,7 @@ impl Columns {
         })
     }
 
-    /// Whether one of these columns is called so.
+    /// Whether one of these columns has this name.
     pub fn names(&self, name: &str) -> bool {
         self.in_file_order().any(|column| column.name == name)
     }
@@ -117,8 +117,8 @@ impl Columns {
         renamed.q.iter().all(|column| header.contains(&column.name))
     }
 
-    /// These columns, each that has its standard name and is not in the header by the name of its joint if that is there. A
-    /// single joint may be the only one of the header, or have none: `q` for `q1`.
+    /// These columns, with each standard name that the header lacks replaced by the one with the joint's name, if the
+    /// header has that. A single joint may be the header's only named one, or have no name: `q` for `q1`.
     fn renamed_for(mut self, header: &[String]) -> Columns {
         let single = self.q.len() == 1;
         if let (true, [], [joint]) = (single, &*self.joint_names, &*joints(header)) {
@@ -147,7 +147,7 @@ impl Columns {
     }
 }
 
-/// The joints by whose names a header calls its angles.
+/// The joints after which a header names its angles.
 pub(super) fn joints(header: &[String]) -> Vec<&str> {
     let joints = header.iter().filter_map(|name| name.strip_prefix("q_"));
     joints.collect()
@@ -160,7 +160,7 @@ fn numbered(prefix: &str, joints: usize) -> Vec<Column> {
         .collect()
 }
 
-/// Where one column of a channel stands in a row, and what its numbers become.
+/// Where one column of a channel stands in a row, and how its numbers are converted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cell {
     pub index: usize,
@@ -169,7 +169,7 @@ pub(super) struct Cell {
     pub late_s: f64,
 }
 
-/// Words in the names of columns that hold torques or commands, and of those that hold velocities.
+/// Words in the names of columns that hold torques or commands, and of columns that hold velocities.
 const LIKE_DRIVEN: &[&str] = &["tau", "torque", "effort", "cmd", "command"];
 const LIKE_VELOCITY: &[&str] = &["qd", "dq", "vel", "speed", "omega", "rpm", "dot"];
 
@@ -185,7 +185,7 @@ pub(super) struct Header<'a> {
 pub(super) struct Layout {
     pub time: Cell,
     pub q: Vec<Cell>,
-    /// `None` where velocities come from the angles.
+    /// `None` if velocities come from the angles.
     pub qd: Option<Vec<Cell>>,
     /// `None` for the log of a passive rig, which has no torque columns.
     pub tau: Option<Vec<Cell>>,
@@ -251,8 +251,8 @@ impl Header<'_> {
         Ok(())
     }
 
-    /// A header with another number of complete joints is most likely the log of another rig. Where
-    /// only one of a joint's columns is missing, a wrong name is more likely, which `find` reports.
+    /// A header with another number of complete joints most likely belongs to the log of another rig. If only one of a
+    /// joint's columns is missing, a wrong name is more likely, which `find` reports.
     fn check_joint_count(&self, joints: usize) -> Result<(), LogError> {
         let has = |name: String| self.names.contains(&name);
         let header = (1..).take_while(|joint| has(format!("q{joint}"))).count();
@@ -270,8 +270,8 @@ impl Header<'_> {
         Ok(())
     }
 
-    /// Whether the name of some column holds one of these words. A torque or a velocity under an unexpected name must
-    /// not be passed over silently.
+    /// Whether the name of some column contains one of these words. A torque or a velocity under an unexpected name
+    /// must not be passed over silently.
     fn has_one_like(&self, words: &[&str]) -> bool {
         let is_like = |name: &String| {
             let name = name.to_lowercase();
@@ -313,8 +313,8 @@ impl Header<'_> {
         }
     }
 
-    /// Points to the nearest of the names that are `free` (no other channel's) where one is near, and
-    /// to all names otherwise.
+    /// Points to the nearest of the `free` names (those of no other channel) if one is near, and to all names
+    /// otherwise.
     fn remedy(&self, wanted: &str, quantity: Quantity, free: &[String]) -> String {
         let joints = joints(&self.names);
         if !joints.is_empty() && quantity == Quantity::Angle {
@@ -367,8 +367,8 @@ impl Header<'_> {
     }
 }
 
-/// 1 for the same name but for case, 0 for nothing in common; a swap of neighbours (`dq1` for `qd1`)
-/// counts as one change.
+/// 1 for the same name up to case, 0 for nothing in common; a swap of neighbours (`dq1` for `qd1`) counts as one
+/// change.
 fn likeness(a: &str, b: &str) -> f64 {
     strsim::normalized_damerau_levenshtein(&a.to_lowercase(), &b.to_lowercase())
 }

@@ -8,7 +8,7 @@ use super::log::{Interval, Log};
 /// three periods as a matter of course; beyond five the motion between the rows is anyone's guess.
 const GAP_STEPS: f64 = 5.0;
 
-/// Whether nobody knows how the rig moved over a step, of a log with this median step \[s\].
+/// Whether a step is too long to know how the rig moved over it, in a log with this median step \[s\].
 pub(crate) fn is_gap(step_s: f64, median_step_s: f64) -> bool {
     step_s > GAP_STEPS * median_step_s + SAME_S
 }
@@ -21,10 +21,10 @@ pub(super) const DROPPED_STEPS: f64 = 1.7;
 /// largest change from row to row close by.
 const SMOOTH: f64 = 2.0;
 
-/// Rows on either side that tell how smoothly the torque changes.
+/// Rows on either side that show how smoothly the torque changes.
 const CLOSE_BY: usize = 4;
 
-/// A torque's change by less than this share of its range moves nothing that a sensor sees, wherever in the step it came.
+/// A torque change below this share of its range moves nothing that a sensor sees, whenever in the step it came.
 const SMALL_CHANGE: f64 = 0.01;
 
 /// A step in which rows are missing.
@@ -56,9 +56,9 @@ pub(super) fn dropped(log: &Log) -> Vec<Dropped> {
 }
 
 impl Log {
-    /// The log with rows in the place of those that the logger dropped, so that the torque changes as smoothly
-    /// as it does around them. Where it does not pass a step smoothly, nobody knows when it changed: such steps
-    /// are left out, unless windows of `window_s` around them make up more than half of the log.
+    /// The log with the rows that the logger dropped filled in, so that the torque changes as smoothly as it does
+    /// around them. If it does not pass a step smoothly, the time of the change is unknown: such steps are left out,
+    /// unless windows of `window_s` around them make up more than half of the log.
     pub(super) fn completed(mut self, window_s: f64) -> Log {
         let missing = dropped(&self);
         if missing.is_empty() {
@@ -84,7 +84,7 @@ impl Log {
     }
 
     /// Whether the torques of all joints change over the step as they do from row to row around it, or by no more than
-    /// what is small for them.
+    /// a `small` amount.
     fn is_smooth_over(&self, dropped: &Dropped, small: &[f64]) -> bool {
         let (row, count) = (dropped.row, dropped.count as f64 + 1.0);
         let from = row.saturating_sub(CLOSE_BY);
@@ -97,7 +97,7 @@ impl Log {
         })
     }
 
-    /// Puts rows into steps, which rise, at equal times.
+    /// Inserts rows into steps, given in ascending order, at equal times.
     fn insert(&mut self, missing: &[Dropped]) {
         let time = &self.time;
         let between = |channel: &[f64], row: usize, share: f64| {
@@ -113,7 +113,7 @@ impl Log {
             *channel = with_rows(channel, missing, |row, share| between(channel, row, share));
         }
         self.time = with_rows(time, missing, |row, share| between(time, row, share));
-        // Rows put in before each step, and before the end.
+        // Number of rows inserted before each step, and before the end.
         let before: Vec<usize> = std::iter::once(0)
             .chain(missing.iter().scan(0, |sum, dropped| {
                 *sum += dropped.count;
@@ -134,8 +134,8 @@ impl Log {
     }
 }
 
-/// A channel with values put into steps, which rise: what `value` tells of the step's first row and the share of it that
-/// has passed.
+/// A channel with values inserted into steps, given in ascending order: `value` takes the step's first row and the
+/// share of the step that has passed.
 fn with_rows(channel: &[f64], missing: &[Dropped], value: impl Fn(usize, f64) -> f64) -> Vec<f64> {
     let added: usize = missing.iter().map(|dropped| dropped.count).sum();
     let mut whole = Vec::with_capacity(channel.len() + added);
@@ -150,7 +150,7 @@ fn with_rows(channel: &[f64], missing: &[Dropped], value: impl Fn(usize, f64) ->
     whole
 }
 
-/// Largest less smallest value.
+/// Largest minus smallest value.
 fn range(values: &[f64]) -> f64 {
     let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     highest - values.iter().copied().fold(f64::INFINITY, f64::min)

@@ -11,9 +11,9 @@ use crate::limits::{LOG_TIME, READING};
 /// Where in a file something is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// Of a text, from 1 as an editor counts.
+    /// Line of a text, from 1 as an editor counts.
     Line(usize),
-    /// Of a table without lines, from 1.
+    /// Row of a table without lines, from 1.
     Row(usize),
     /// The names of a file's arrays.
     Arrays,
@@ -31,8 +31,8 @@ impl fmt::Display for Place {
 
 /// Why a log could not be read.
 ///
-/// Each message is whole in itself: file, line (from 1, as an editor counts), column name, what is
-/// wrong and what to do. None has a source to print beside it.
+/// Each message is complete in itself: file, line (from 1, as an editor counts), column name, what is wrong and what to
+/// do. None has a source to print with it.
 #[derive(Debug, Error)]
 pub enum LogError {
     /// The file cannot be opened or read.
@@ -51,7 +51,7 @@ pub enum LogError {
         /// Line of the first byte that is not text.
         line: usize,
     },
-    /// The file is not of the form that its beginning promises.
+    /// The file is not of the form that its beginning suggests.
     #[error("{path}: {fault}")]
     Form {
         /// The file.
@@ -216,7 +216,7 @@ pub enum CellFault {
 }
 
 impl CellFault {
-    /// What is wrong with a number that is no reading.
+    /// What is wrong with a number that is not a valid reading.
     pub fn of_number(number: f64) -> Self {
         match number.is_finite() {
             true => Self::TooLarge(number),

@@ -6,30 +6,31 @@ use std::ops::Range;
 use super::local_cubic::half_width_s;
 use super::log::{Interval, Log};
 
-/// So many rows are examined at most, four minutes at 1 kHz: more say the same and cost many times the memory of the log.
+/// Number of rows examined at most, four minutes at 1 kHz: more show the same and cost many times the memory of the
+/// log.
 const EXAMINED_ROWS: usize = 1 << 18;
 
-/// Those of a longer log are taken in so many stretches, which are spread evenly from its first row to its last.
+/// Number of intervals from which the rows of a longer log are taken, spread evenly from its first row to its last.
 const STRETCHES: usize = 8;
 
-/// The stretches of a log of so many rows that are examined: one, but of long logs.
+/// The examined intervals of a log with this many rows: one, except for long logs.
 pub(super) fn examined(rows: usize) -> Vec<Range<usize>> {
     if rows <= EXAMINED_ROWS {
         return std::iter::once(0..rows).collect();
     }
     let length = EXAMINED_ROWS / STRETCHES;
-    let first = |stretch: usize| stretch * (rows - length) / (STRETCHES - 1);
-    let rows_of = |stretch: usize| first(stretch)..first(stretch) + length;
+    let first = |interval: usize| interval * (rows - length) / (STRETCHES - 1);
+    let rows_of = |interval: usize| first(interval)..first(interval) + length;
     (0..STRETCHES).map(rows_of).collect()
 }
 
-/// The values at the rows that are examined, one stretch after the other.
+/// The values at the examined rows, one interval after the other.
 pub(super) fn at_examined(values: &[f64]) -> Cow<'_, [f64]> {
     match &*examined(values.len()) {
         [all] => Cow::Borrowed(&values[all.clone()]),
-        stretches => {
-            let stretches = stretches.iter().map(|rows| &values[rows.clone()]);
-            Cow::Owned(stretches.collect::<Vec<_>>().concat())
+        intervals => {
+            let intervals = intervals.iter().map(|rows| &values[rows.clone()]);
+            Cow::Owned(intervals.collect::<Vec<_>>().concat())
         }
     }
 }
@@ -40,30 +41,30 @@ impl Log {
         self.rows() > EXAMINED_ROWS
     }
 
-    /// What fits read of a long log: the stretches of it that are examined, without what is near their ends, and a note that says
-    /// so. Fits to all rows take hours and tell no more.
+    /// The part of a long log that fits read: its examined intervals, without the rows near their ends, and a note that
+    /// says so. Fits to all rows take hours and show no more.
     #[must_use]
     pub fn shortened(self) -> Log {
         if !self.is_long() {
             return self;
         }
-        let stretches = examined(self.rows());
+        let intervals = examined(self.rows());
         let half_width_s = half_width_s(self.median_step());
         let rounded = |time_s: f64| (time_s * 1e6).round() / 1e6;
-        let mut log = self.at(&stretches);
+        let mut log = self.at(&intervals);
         let between = |pair: &[Range<usize>]| Interval {
             start_s: rounded(self.time[pair[0].end - 1] - half_width_s),
             end_s: rounded(self.time[pair[1].start] + half_width_s),
         };
-        log.leave_out.extend(stretches.windows(2).map(between));
+        log.leave_out.extend(intervals.windows(2).map(between));
         log.notes.push(format!(
-            "fits and errors are of {EXAMINED_ROWS} of its {} rows, in {STRETCHES} stretches that are spread evenly over it",
+            "fits and errors are of {EXAMINED_ROWS} of its {} rows, in {STRETCHES} intervals that are spread evenly over it",
             self.rows()
         ));
         log
     }
 
-    /// The rows of these ranges, which rise.
+    /// The rows of these ranges, given in ascending order.
     pub(crate) fn at(&self, ranges: &[Range<usize>]) -> Log {
         let cut = |column: &Vec<f64>| {
             let parts = ranges.iter().map(|rows| &column[rows.clone()]);
@@ -104,17 +105,17 @@ mod tests {
     #[test]
     fn a_long_log_is_examined_from_its_first_row_to_its_last() {
         for rows in [500, EXAMINED_ROWS] {
-            let stretches = examined(rows);
-            assert_eq!((stretches.len(), &stretches[0]), (1, &(0..rows)));
+            let intervals = examined(rows);
+            assert_eq!((intervals.len(), &intervals[0]), (1, &(0..rows)));
         }
         for rows in [EXAMINED_ROWS + 1, 10_000_000] {
-            let stretches = examined(rows);
+            let intervals = examined(rows);
             assert_eq!(
-                (stretches[0].start, stretches[STRETCHES - 1].end),
+                (intervals[0].start, intervals[STRETCHES - 1].end),
                 (0, rows)
             );
             assert!(
-                stretches
+                intervals
                     .windows(2)
                     .all(|pair| pair[0].end <= pair[1].start)
             );
@@ -142,7 +143,7 @@ mod tests {
         let is_row = |row: &usize| of_log.time[*row] == 0.0 || of_log.time[*row] == 399.999;
         assert!(of_log.masked[0].len() == 2 && of_log.masked[0].iter().all(is_row));
         assert!(of_log.notes[0].contains("262144 of its 400000 rows"));
-        // No window begins or ends at the end of a stretch that the log does not end with.
+        // No window begins or ends at the end of an interval, except at the ends of the log.
         let ends = of_log
             .time
             .windows(2)

@@ -1,22 +1,22 @@
 //! Rows by their times.
 //!
-//! Stamps are rounded: to decimals where they are written, and to doubles where they are read, which lie a quarter of a
-//! microsecond apart in Unix time. What is meant to be one time is taken as one, so that it does not matter when a clock was
-//! set to zero.
+//! Time stamps are rounded: to decimals when they are written, and to doubles when they are read, which lie a quarter
+//! of a microsecond apart in Unix time. Times that are meant to be equal are taken as equal, so that it does not matter
+//! when a clock was set to zero.
 
-/// Times nearer to each other than this are the same \[s\]: beyond any rounding, and a twentieth of the step of the fastest
-/// rig.
+/// Times nearer to each other than this are the same \[s\]: above any rounding error, and a twentieth of the step of
+/// the fastest rig.
 pub const SAME_S: f64 = 1e-6;
 
-/// Steps fit a whole number of times into a length if they fall short of it by this share of one.
+/// Steps fit a whole number of times into a length if they fall short of it by at most this share of a step.
 pub(super) const ROUNDING: f64 = 1e-3;
 
-/// The first row that is at a time \[s\] or after it, of times that rise; their number where there is none.
+/// The first row at or after a time \[s\], in ascending times; the number of times if there is none.
 pub fn row_from(time: &[f64], at_s: f64) -> usize {
     time.partition_point(|t| *t < at_s - SAME_S)
 }
 
-/// The first row after a time \[s\], of times that rise; their number where there is none.
+/// The first row after a time \[s\], in ascending times; the number of times if there is none.
 pub fn row_after(time: &[f64], at_s: f64) -> usize {
     time.partition_point(|t| *t <= at_s + SAME_S)
 }

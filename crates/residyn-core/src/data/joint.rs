@@ -10,13 +10,13 @@ use thiserror::Error as ThisError;
 
 /// One joint of a rig.
 ///
-/// Lists with one entry a joint are indexed by it, from 0. Users see its number, from 1: that is what it prints, what
+/// Lists with one entry per joint are indexed by it, from 0. Users see its number, from 1: that is what it prints, what
 /// files hold and what is read from them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Joint(usize);
 
 impl Joint {
-    /// The joint at this place of a list with one entry a joint.
+    /// The joint at this place of a list with one entry per joint.
     pub const fn at(index: usize) -> Self {
         Self(index)
     }
@@ -36,12 +36,12 @@ impl Joint {
         self.0 < count
     }
 
-    /// Its place in a list with one entry a joint.
+    /// Its place in a list with one entry per joint.
     pub const fn index(self) -> usize {
         self.0
     }
 
-    /// The one after it.
+    /// The joint after it.
     #[must_use]
     pub const fn next(self) -> Self {
         Self(self.0 + 1)
@@ -52,12 +52,12 @@ impl Joint {
         self.0 + 1
     }
 
-    /// For people: its number, with its name where it has one.
+    /// Its label for users: its number, with its name if it has one.
     pub fn called(self, name: Option<&str>) -> String {
         name.map_or_else(|| self.to_string(), |name| format!("{self} ({name})"))
     }
 
-    /// A variable of this joint: `q2` of `q`.
+    /// A variable of this joint: `q2` for `q`.
     pub fn name(self, stem: &str) -> String {
         format!("{stem}{self}")
     }

@@ -35,7 +35,7 @@ pub(super) fn rows_that_jump(values: &[f64]) -> Vec<usize> {
         .collect()
 }
 
-/// Puts what the rows around them tell in place of these rows, which are neither the first nor the last.
+/// Replaces these rows, none of them the first or the last, by values interpolated from the rows around them.
 pub(super) fn bridge(time: &[f64], values: &mut [f64], rows: &[usize]) {
     for &row in rows {
         let around = [row.saturating_sub(2), row - 1, row + 1, row + 2];
@@ -44,7 +44,7 @@ pub(super) fn bridge(time: &[f64], values: &mut [f64], rows: &[usize]) {
 }
 
 /// A channel at a time between four of its rows, by the cubic through them; by the straight line through the inner two
-/// where the outer ones are beyond the ends of the log.
+/// if the outer ones are beyond the ends of the log.
 pub(super) fn interpolated(time: &[f64], values: &[f64], rows: [usize; 4], at_s: f64) -> f64 {
     let inner = [rows[1], rows[2]];
     let beyond = rows[0] == rows[1] || rows[3] >= time.len();

@@ -9,19 +9,19 @@ use super::projection::{dot, free_of, orthonormal};
 pub(super) struct Lag {
     /// In samples of the two series, with a fraction; positive when the effect trails the cause.
     pub samples: f64,
-    /// Correlation at that lag, -1 to 1, after what the basis explains is taken out of both.
+    /// Correlation at that lag, -1 to 1, after the part that the basis explains is removed from both.
     pub correlation: f64,
     /// Whether the correlation still rises at the end of the lags searched. The true lag is then
     /// longer, or there is none.
     pub at_edge: bool,
 }
 
-/// Finds the lag, among `lags` in samples, at which `effect` follows `cause` best; negative lags are
-/// those at which the effect comes first. The lags have to include 0.
+/// Finds the lag, among `lags` in samples, at which `effect` follows `cause` best; at negative lags the effect comes
+/// first. The lags have to include 0.
 ///
-/// All series are sampled alike and equally long. At each lag both series are freed from what the
-/// `basis` explains (a constant at least) and correlated; the peak is refined by a parabola through
-/// its neighbours. `None` for series that are too short, or that the basis explains whole.
+/// All series are sampled alike and equally long. At each lag, the part that the `basis` explains (a constant at least)
+/// is removed from both series before they are correlated; the peak is refined by a parabola through its neighbours.
+/// `None` for series that are too short, or that the basis explains entirely.
 pub(super) fn lag(
     cause: &[f64],
     effect: &[f64],
@@ -67,8 +67,8 @@ fn parabola_peak([before, middle, after]: [f64; 3]) -> f64 {
     }
 }
 
-/// Correlation of a series with an `effect` that is already free of the basis and of unit length. The
-/// series itself need not be freed: only the length of what would remain is asked for.
+/// Correlation of a series with an `effect` that is already free of the basis and of unit length. The series itself
+/// need not be freed: only the length of the part that would remain is needed.
 fn correlation(basis: &[Vec<f64>], effect: &[f64], series: &[f64]) -> f64 {
     let whole = dot(series, series);
     let explained: f64 = basis.iter().map(|column| dot(column, series).powi(2)).sum();

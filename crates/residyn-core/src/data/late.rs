@@ -4,7 +4,7 @@ use super::instant::{row_after, row_from};
 use super::log::Log;
 use super::smooth::resampled;
 
-/// The values at the times of the rows, straight between those that were taken `late_s` before them.
+/// The values at the times of the rows, interpolated linearly between those that were taken `late_s` before them.
 pub(super) fn undone(time: &[f64], channel: Vec<f64>, late_s: f64) -> Vec<f64> {
     if late_s == 0.0 {
         return channel;
@@ -13,7 +13,7 @@ pub(super) fn undone(time: &[f64], channel: Vec<f64>, late_s: f64) -> Vec<f64> {
     resampled(wanted, time, &channel).collect()
 }
 
-/// The rows of a log for which all channels have values, where these are so late.
+/// The rows of a log for which all channels have values, given these delays.
 pub(super) fn cut(mut log: Log, late_s: impl IntoIterator<Item = f64>) -> Log {
     let ends = |(early, late): (f64, f64), late_s: f64| (early.min(late_s), late.max(late_s));
     let (early, late) = late_s.into_iter().fold((0.0, 0.0), ends);

@@ -88,8 +88,8 @@ fn parse_interval(text: &str) -> Option<Interval> {
 
 /// Adds each interval to the log that it names.
 ///
-/// A log is meant by its path as it was given or, where that is unique, by its file name. An interval
-/// that lies outside its log changes nothing and is told in the log's notes.
+/// A log is identified by its path as given or, if that is unique, by its file name. An interval that lies outside its
+/// log changes nothing and is reported in the log's notes.
 ///
 /// # Errors
 /// [`LeaveOutError::Unknown`] for an entry that matches no log, [`LeaveOutError::Ambiguous`] for one
@@ -142,7 +142,7 @@ fn place(logs: &[Log], name: &str) -> Result<usize, LeaveOutError> {
     }
 }
 
-/// Whether two paths are the same text, but for a leading `./`.
+/// Whether two paths are the same text, apart from a leading `./`.
 fn same_path(a: &Path, b: &Path) -> bool {
     let parts = |path| Path::components(path).filter(|part| *part != Component::CurDir);
     parts(a).eq(parts(b))

@@ -12,8 +12,8 @@ use super::statistics::median_of;
 
 /// Half width of the window that the fit reads \[s\]: 16 ms, or four median steps of slower logs.
 ///
-/// 16 ms is short against the swing of a desk-sized rig and long enough at 500 Hz to average an
-/// encoder step of 0.4 mrad down to 0.03 rad/s; four steps leave nine rows for four coefficients.
+/// 16 ms is short relative to the swing of a desk-sized rig and long enough at 500 Hz to average an encoder step of 0.4
+/// mrad down to 0.03 rad/s; four steps leave nine rows for four coefficients.
 pub fn half_width_s(median_step_s: f64) -> f64 {
     (4.0 * median_step_s).max(0.016)
 }
@@ -27,15 +27,15 @@ pub struct LocalCubic {
     pub slope: f64,
     /// Second derivative, in the channel's unit per s^2.
     pub curvature: f64,
-    /// Root mean square of what the cubic leaves of the values, by their number less that of its coefficients.
+    /// Root mean square residual of the cubic; the divisor is the number of values less that of its coefficients.
     pub rms: f64,
 }
 
 impl LocalCubic {
     /// The frequency above which the value loses more than 3 dB of what was logged \[Hz\].
     ///
-    /// The value is the mean over s = -1..1 with the weight (9 - 15 s^2) / 8, whose transform falls to 0.707 at
-    /// 3.34 rad a half width: 3.34 / (2 pi) = 0.53.
+    /// The value is the mean over s = -1..1 with the weight (9 - 15 s^2) / 8, whose transform falls to 0.707 at 3.34
+    /// rad per half width: 3.34 / (2 pi) = 0.53.
     pub(super) fn cutoff_hz(half_width_s: f64) -> f64 {
         0.53 / half_width_s
     }
@@ -49,9 +49,9 @@ impl LocalCubic {
         (18.75 / rows).sqrt() / half_width_s
     }
 
-    /// Error of the value and, per half width, of the slope where the values go on beyond a cubic, per unit of `rms`: of
-    /// s^4 = (8 P4 + 20 P2 + 7 P0) / 35 and s^5 = (8 P5 + 28 P3 + 27 P1) / 63 in Legendre polynomials the cubic leaves
-    /// the first term.
+    /// Error of the value and, per half width, of the slope if the values have terms beyond a cubic, per unit of `rms`:
+    /// of s^4 = (8 P4 + 20 P2 + 7 P0) / 35 and s^5 = (8 P5 + 28 P3 + 27 P1) / 63 in Legendre polynomials, the cubic
+    /// leaves the first term.
     pub(crate) const TRUNCATION: [f64; 2] = [1.1, 6.2];
 
     /// Standard deviation of the value per standard deviation of white noise on the values, likewise: the Legendre
@@ -69,8 +69,8 @@ pub(crate) fn rows_around(time: &[f64], row: usize, half_width_s: f64) -> Range<
 
 /// Fits a cubic to the values within `half_width_s` on either side of a row.
 ///
-/// `time` \[s\] increases strictly and is as long as `values`. `None` where the log does not reach
-/// `half_width_s` to both sides of the row, or has fewer than five rows there (a gap).
+/// `time` \[s\] increases strictly and is as long as `values`. `None` if the log does not reach `half_width_s` to both
+/// sides of the row, or has fewer than five rows there (a gap).
 pub fn local_cubic(
     time: &[f64],
     values: &[f64],
@@ -86,7 +86,7 @@ pub fn local_cubic(
     if rows.len() < 5 {
         return None;
     }
-    // Scaled to -1..1, and seen from the row's own value, the sums keep their digits.
+    // Scaled to -1..1, and relative to the row's own value, the sums keep their digits.
     let point = |i: usize| ((time[i] - centre) / half_width_s, values[i] - values[row]);
     let points = rows.clone().map(point);
     let [c0, c1, c2, c3] = cubic_coefficients(points.clone())?;
@@ -101,8 +101,8 @@ pub fn local_cubic(
     })
 }
 
-/// The derivative of a channel at every row: the slope of the cubic fitted around it or, where there is none (ends, gaps),
-/// the difference of the rows on either side over the time between them. At least two rows.
+/// The derivative of a channel at every row: the slope of the cubic fitted around it or, if there is none (ends, gaps),
+/// the difference of the rows on either side over the time between them. Needs at least two rows.
 pub(super) fn slopes(time: &[f64], values: &[f64]) -> Vec<f64> {
     let half_width = half_width_s(median_of(differences(time)));
     let between = |a: usize, b: usize| (values[b] - values[a]) / (time[b] - time[a]);
@@ -131,8 +131,8 @@ fn cubic_coefficients(points: impl Iterator<Item = (f64, f64)>) -> Option<[f64; 
     solve(normal, right)
 }
 
-/// Solves a symmetric positive definite system by elimination, which needs no pivoting there. `None`
-/// where the matrix is singular to working precision.
+/// Solves a symmetric positive definite system by elimination, which needs no pivoting there. `None` if the matrix is
+/// singular to working precision.
 fn solve(mut matrix: [[f64; 4]; 4], mut right: [f64; 4]) -> Option<[f64; 4]> {
     for pivot in 0..4 {
         if matrix[pivot][pivot] <= 1e-12 {

@@ -32,7 +32,7 @@ impl Interval {
         self.end_s - self.start_s
     }
 
-    /// Whether it has a time in common with another span \[s\].
+    /// Whether it overlaps or touches another span \[s\].
     pub fn touches(&self, from_s: f64, to_s: f64) -> bool {
         self.start_s <= to_s + SAME_S && self.end_s >= from_s - SAME_S
     }
@@ -64,11 +64,11 @@ pub struct Log {
     pub tau: Vec<Vec<f64>>,
     /// Which of the two: [`Quantity::Torque`] or [`Quantity::Command`].
     pub driven_by: Quantity,
-    /// Rows whose angle jumps and is not to be fitted, `[joint]`, in rising order. The angle there is what the rows around
-    /// tell. May be empty: none in a log as it is read.
+    /// Rows whose angle jumps and is not to be fitted, `[joint]`, in ascending order. The angle there is interpolated
+    /// from the rows around. May be empty: none in a log as it is read.
     pub masked: Vec<Vec<usize>>,
-    /// Rows put in where the logger dropped some, in rising order: all their channels are what the rows around tell. None
-    /// in a log as it is read.
+    /// Rows inserted where the logger dropped some, in ascending order: all their channels are interpolated from the
+    /// rows around. None in a log as it is read.
     pub filled: Vec<usize>,
     /// Intervals that are neither fitted nor scored, for instance because a person touched the rig.
     pub leave_out: Vec<Interval>,
@@ -140,15 +140,15 @@ impl Log {
         self.filled.get(first).is_none_or(|row| row > rows.end())
     }
 
-    /// The log as fits read it: readings that jump are masked, and rows that the logger dropped are put in, or left out
-    /// with the windows of `window_s` around them.
+    /// The log as fits read it: readings that jump are masked, and rows that the logger dropped are filled in, or left
+    /// out with the windows of `window_s` around them.
     #[must_use]
     pub fn for_fits(&self, window_s: f64) -> Log {
         let jumps: Vec<Vec<usize>> = self.q.iter().map(|q| rows_that_jump(q)).collect();
         self.without(&jumps).into_owned().completed(window_s)
     }
 
-    /// The log with angles masked that jump at these rows, `[joint]`.
+    /// The log with angles masked at these rows, at which they jump, `[joint]`.
     pub(super) fn without(&self, jumps: &[Vec<usize>]) -> Cow<'_, Log> {
         if jumps.iter().all(Vec::is_empty) {
             return Cow::Borrowed(self);
@@ -163,8 +163,8 @@ impl Log {
         Cow::Owned(log)
     }
 
-    /// The columns with the names and in the order of a file that is written: `time`, `q1`, ..., `qd1`, ..., `tau1` or
-    /// `cmd1`, ...
+    /// The columns, named and ordered as in a file that is written: `time`, `q1`, ..., `qd1`, ..., `tau1` or `cmd1`,
+    /// ...
     pub fn named_columns(&self) -> impl Iterator<Item = (String, &[f64])> {
         let standard = Columns::standard(self.joints(), self.driven_by);
         let names: Vec<String> = (standard.in_file_order())

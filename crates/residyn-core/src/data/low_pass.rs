@@ -1,9 +1,9 @@
 use std::f64::consts::PI;
 
-/// Butterworth's low-pass filter of order 4, run forwards and backwards over a channel: it shifts no phase.
+/// Butterworth low-pass filter of order 4, run forwards and backwards over a channel: it has no phase shift.
 ///
-/// Two second-order sections, by the bilinear transform with the cutoff kept in place. The ends are continued point by point
-/// about the first and the last value, and the filter starts as if the value there had always been so.
+/// Two second-order sections, by the bilinear transform with a prewarped cutoff. The ends are extended by point
+/// reflection about the first and the last value, and the filter starts as if the value there had always been the same.
 #[derive(Debug, Clone, Copy)]
 pub struct LowPass {
     sections: [Section; 2],
@@ -17,11 +17,11 @@ struct Section {
     a2: f64,
 }
 
-/// Values beyond either end.
+/// Number of values added beyond either end.
 const BEYOND: usize = 15;
 
 impl LowPass {
-    /// A cutoff as a share of the sampling rate, below a half.
+    /// A filter whose cutoff is this share of the sampling rate, below a half.
     pub fn new(cutoff: f64) -> Self {
         let k = (PI * cutoff).tan();
         // The poles of order 4 lie at pi/8 and 3 pi/8 from the real axis.
@@ -96,7 +96,7 @@ mod tests {
     fn straight_lines_pass_unchanged() {
         let line: Vec<f64> = (0..100).map(|k| 3.0 + 0.1 * f64::from(k)).collect();
         let passed = LowPass::new(0.1).apply(&line);
-        // What the start from rest leaves has died away.
+        // The transient of the start has died away.
         for (passed, x) in passed.iter().zip(&line).take(70).skip(30) {
             assert!((passed - x).abs() < 1e-3);
         }

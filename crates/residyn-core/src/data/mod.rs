@@ -35,7 +35,7 @@ mod trajectory;
 pub(crate) use audit::reversed_driving;
 pub use audit::{
     Audit, Channel, Finding, JointAudit, MAX_LAG_S, Remedy, Repeated, Response, Severity,
-    TorqueDemand, TorqueLag, VelocityCheck, audit, audit_together, tell_repeats,
+    TorqueDemand, TorqueLag, VelocityCheck, audit, audit_together, report_repeats,
 };
 pub use channels::Channels;
 pub use column::{Column, Quantity};

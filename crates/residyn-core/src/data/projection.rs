@@ -1,7 +1,6 @@
 //! Linear regression by orthonormal columns: the part of a series that a basis explains, and the rest.
 
-/// Columns of unit length at right angles that span the same space; those that the others span
-/// already are dropped.
+/// Orthogonal columns of unit length that span the same space; columns that the others already span are dropped.
 pub(super) fn orthonormal(columns: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = vec![];
     for column in columns {
@@ -10,8 +9,8 @@ pub(super) fn orthonormal(columns: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f6
     basis
 }
 
-/// The part of a series at right angles to an orthonormal basis, scaled to unit length; `None` if
-/// nothing but rounding is left.
+/// The part of a series orthogonal to an orthonormal basis, scaled to unit length; `None` if nothing but rounding is
+/// left.
 pub(super) fn free_of(basis: &[Vec<f64>], series: &[f64]) -> Option<Vec<f64>> {
     let whole = dot(series, series).sqrt();
     let mut rest = series.to_vec();
@@ -58,7 +57,7 @@ mod tests {
         let part = explained_by(&basis, &series);
         let rest: Vec<f64> = series.iter().zip(&part).map(|(a, b)| a - b).collect();
         assert!(basis.iter().all(|column| dot(column, &rest).abs() < 1e-9));
-        // A straight line is explained whole.
+        // A straight line is explained entirely.
         let line: Vec<f64> = ramp.iter().map(|x| 2.0 - 0.3 * x).collect();
         let found = explained_by(&basis, &line);
         assert!(line.iter().zip(found).all(|(a, b)| (a - b).abs() < 1e-9));

@@ -15,15 +15,15 @@ use crate::expr::listed;
 use crate::limits::{LOG_JOINTS, LOG_TIME, is_reading, log_steps, too_large};
 
 impl Log {
-    /// One trajectory of a rig with `joints` joints from the table that a file holds; `path` is for messages.
+    /// One trajectory of a rig with `joints` joints from a file's table; `path` is for messages.
     ///
-    /// Columns may stand in any order. Columns that nothing asks for are ignored, and a note names
-    /// them. A table without any torque column is the log of a passive rig: its torques are zero, and
-    /// a note says so. Without any velocity column, velocities are the slopes of cubics fitted to the angles.
+    /// Columns may be in any order. Columns that are not needed are ignored, and a note names them. A table without any
+    /// torque column is the log of a passive rig: its torques are zero, and a note says so. Without any velocity
+    /// column, velocities are the slopes of cubics fitted to the angles.
     ///
     /// # Errors
-    /// A [`LogError`] that names file, place, column, fault and remedy, for anything that is not a
-    /// table of finite numbers with strictly increasing time and the asked number of joints.
+    /// A [`LogError`] that names file, place, column, fault and remedy, for anything that is not a table of finite
+    /// numbers with strictly increasing time and the requested number of joints.
     pub fn of_table(
         path: &Path,
         table: &mut dyn Table,
@@ -33,8 +33,8 @@ impl Log {
         log(path, table, joints, columns)
     }
 
-    /// As [`Log::of_table`], of a table with the standard columns and as many joints as its header has, in its order where
-    /// they have names.
+    /// As [`Log::of_table`], for a table with the standard columns and as many joints as its header has, in its order
+    /// if they have names.
     ///
     /// # Errors
     /// As [`Log::of_table`].
@@ -42,9 +42,9 @@ impl Log {
         standard(path, table, Quantity::Torque)
     }
 
-    /// The log that a file with these columns, in memory, is: with `rig` as [`Log::of_table`] by its columns and number of
-    /// joints, else as [`Log::of_standard_table`], where columns `cmd1`, ... without torques are commands. `name` is for messages
-    /// and for the report.
+    /// The log with these columns in memory: with `rig`, as [`Log::of_table`] with its columns and number of joints,
+    /// otherwise as [`Log::of_standard_table`], where columns `cmd1`, ... without torques are commands. `name` is for
+    /// messages and the report.
     ///
     /// # Errors
     /// As [`Log::of_table`].
@@ -54,7 +54,7 @@ impl Log {
         rig: Option<(usize, &Columns)>,
     ) -> Result<Log, LogError> {
         let path = Path::new(name);
-        // What is in memory already needs no limit.
+        // Data already in memory need no limit.
         let mut table = Arrays::of(u64::MAX);
         for (name, column) in columns {
             table.add(name, column);
@@ -86,12 +86,12 @@ fn standard(path: &Path, table: &mut dyn Table, driven_by: Quantity) -> Result<L
         driven_by,
         ..Columns::default()
     };
-    // A header of no joint lacks the first.
+    // A header without joints lacks the first.
     let count = numbered.max(columns.joint_names.len()).max(1);
     log(path, table, count, &columns)
 }
 
-/// Refuses more joints than are looked at without a model that chooses among them.
+/// Refuses more joints than are read without a model that chooses among them.
 fn check_joints(path: &Path, joints: usize) -> Result<(), LogError> {
     match joints <= LOG_JOINTS {
         true => Ok(()),
@@ -104,7 +104,7 @@ fn check_joints(path: &Path, joints: usize) -> Result<(), LogError> {
     }
 }
 
-/// The log that the table of a file is.
+/// The log in a file's table.
 fn log(
     path: &Path,
     table: &mut dyn Table,
@@ -132,7 +132,7 @@ fn log(
             expected: header.names.len(),
         });
     }
-    // What a log of many joints lacks is made: a short text may become many numbers.
+    // Channels that a log of many joints lacks are generated: a short text may become many numbers.
     let bytes = (8 * (1 + 3 * joints) as u64).saturating_mul(numbers.rows as u64);
     if bytes > table.most_bytes() {
         let fault = too_large();
@@ -148,7 +148,7 @@ fn log(
         },
         Err(unreadable) => unreadable,
     };
-    // The cells are gone through in the order in which they were asked for.
+    // The cells are read in the order in which they were requested.
     let mut numbers = numbers.columns.into_iter();
     let mut column = |cell: &Cell| -> Result<Vec<f64>, LogError> {
         let mut read = numbers.next().unwrap_or_default();
@@ -221,7 +221,7 @@ fn log(
     }
 }
 
-/// A pause in a log, before a row of it.
+/// A pause in a log, before one of its rows.
 struct Pause {
     row: usize,
     length_s: f64,
@@ -229,7 +229,7 @@ struct Pause {
     step_s: f64,
 }
 
-/// The longest pause of a log that lasts for more of its median steps than are taken.
+/// The longest pause of a log, if the log lasts for more of its median steps than are accepted.
 fn longest_pause(time: &[f64]) -> Option<Pause> {
     let duration_s = time.last()? - time.first()?;
     let most = log_steps(time.len());

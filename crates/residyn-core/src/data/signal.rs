@@ -6,10 +6,10 @@
 use super::instant::ROUNDING;
 use super::statistics::{SIGMA_PER_MAD, deviation, mad, median, quantile};
 
-/// With fewer rows quantisation cannot be told from chance.
+/// With fewer rows, quantisation cannot be distinguished from chance.
 const MIN_ROWS_FOR_RESOLUTION: usize = 20;
 
-/// Resampling is refused where it would multiply the number of values by more than this.
+/// Resampling is refused if it would multiply the number of values by more than this.
 const MAX_FILL: f64 = 10.0;
 
 /// Differences of neighbours; one fewer than the values.
@@ -22,9 +22,9 @@ const GAINS: [f64; 3] = [6.0, 20.0, 70.0];
 
 /// Standard deviation of white noise on a smooth channel, in the channel's unit.
 ///
-/// Differences of some order remove all that is a polynomial of a lower one over their rows, and leave white noise larger by
-/// a known factor (von Neumann 1941). What the signal leaves beside it is least in one of these orders: for steps that are long
-/// against the motion the result is an upper bound. 0 for fewer than five rows.
+/// Differences of some order remove any polynomial of lower order over their rows, and amplify white noise by a known
+/// factor (von Neumann 1941). The part of the signal that remains with it is least in one of these orders: for steps
+/// that are long relative to the motion, the result is an upper bound. 0 for fewer than five rows.
 pub(super) fn noise_std(values: &[f64]) -> f64 {
     let mut differenced = differences(values);
     let of_order = |gain: f64| {
@@ -37,11 +37,11 @@ pub(super) fn noise_std(values: &[f64]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Values farther from the median than so many deviations are spikes.
+/// Values farther from the median than this many deviations are spikes.
 const SPIKES: f64 = 4.0;
 
-/// Standard deviation without spikes; 0 of no values. Spikes are told by the median absolute deviation, which itself is a whole
-/// number of steps where the values are rounded.
+/// Standard deviation without spikes; 0 for no values. Spikes are detected by the median absolute deviation, which is
+/// itself a whole number of steps if the values are rounded.
 fn inner_deviation(values: &[f64]) -> f64 {
     let (centre, bound) = (median(values), SPIKES * SIGMA_PER_MAD * mad(values));
     let inner = values.iter().copied();
@@ -98,8 +98,8 @@ fn quantum(gaps: &[f64], near: f64) -> Option<f64> {
     steps.into_iter().find(|step| are_multiples(gaps, *step))
 }
 
-/// Whether at least 90 % of the gaps shorter than 20 steps are whole multiples of the step. Over longer
-/// gaps the error of the step itself would blur what is whole.
+/// Whether at least 90 % of the gaps shorter than 20 steps are whole multiples of the step. Over longer gaps, the error
+/// of the step itself would blur the multiples.
 fn are_multiples(gaps: &[f64], step: f64) -> bool {
     let short: Vec<f64> = gaps
         .iter()

@@ -9,12 +9,12 @@ use crate::limits::log_steps;
 const CUTOFF_HZ: f64 = 10.0;
 /// Highest cutoff as a share of half the sampling rate.
 const HIGHEST: f64 = 0.2;
-/// Time between rows that are fitted, s: a fifth of the period of what just passes.
+/// Time between rows that are fitted, s: a fifth of the period at the cutoff.
 const ROWS_S: f64 = 0.02;
 /// Time at either end of a log that is not used: the filter knows nothing beyond the ends, s.
 const ENDS_S: f64 = 0.5;
 
-/// Channels of a log at even steps, `[joint][row]`, in which nothing moves faster than the filter lets through.
+/// Channels of a log at even steps, `[joint][row]`, in which nothing moves faster than the filter passes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Smooth {
     /// s
@@ -25,8 +25,8 @@ pub struct Smooth {
     pub qdd: Vec<Vec<f64>>,
     /// N m or N
     pub tau: Vec<Vec<f64>>,
-    /// Signs of the velocities, smoothed over a width and filtered like the torques: what is left of friction that jumps.
-    /// Empty where no widths are given.
+    /// Signs of the velocities, smoothed over a width and filtered like the torques: what remains of friction that
+    /// jumps. Empty if no widths are given.
     pub directions: Vec<Vec<f64>>,
 }
 
@@ -44,7 +44,7 @@ pub struct Smoothing {
 }
 
 impl Smoothing {
-    /// At the median step of a log, without half a second at either end and without the intervals that are left out.
+    /// Smoothing at the median step of a log, without half a second at either end and without left-out intervals.
     pub fn of(log: &Log) -> Self {
         let step_s = log.median_step();
         let cutoff = (CUTOFF_HZ * step_s).min(HIGHEST / 2.0);
@@ -59,7 +59,7 @@ impl Smoothing {
         }
     }
 
-    /// Every so many rows that what is left still holds all that the filter lets through.
+    /// Keeps every n-th row, with n small enough that these rows hold everything that the filter passes.
     #[must_use]
     pub fn thinned(self) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive, and small
@@ -75,7 +75,7 @@ impl Smoothing {
         self.used_of(&self.filtered(channel))
     }
 
-    /// At all even times.
+    /// The filtered channel at all even times.
     fn filtered(&self, channel: &[f64]) -> Vec<f64> {
         let even = self.even.iter().copied();
         let even: Vec<f64> = resampled(even, &self.logged, channel).collect();
@@ -88,7 +88,8 @@ impl Smoothing {
 }
 
 impl Smooth {
-    /// A log, all rows that are used. Velocity and acceleration are central differences of the filtered angle.
+    /// The channels of a log at all rows that are used. Velocity and acceleration are central differences of the
+    /// filtered angle.
     pub fn of(log: &Log) -> Self {
         Self::by(&Smoothing::of(log), log, &[])
     }
@@ -134,7 +135,7 @@ impl Smooth {
     }
 }
 
-/// Even steps over the log; none over a part of one that is nearly all pause.
+/// Even steps over the log; none if the log, or the part of one, is nearly all pause.
 fn even(log: &Log, step_s: f64) -> Vec<f64> {
     let is_dense = step_s > 0.0 && log.duration() <= log_steps(log.rows()) * step_s;
     let Some(first) = log.time.first().filter(|_| is_dense) else {
@@ -146,7 +147,7 @@ fn even(log: &Log, step_s: f64) -> Vec<f64> {
     (0..=steps).map(|k| first + k as f64 * step_s).collect()
 }
 
-/// A channel at other times that rise, on straight lines between its rows.
+/// A channel at other times, given in ascending order, interpolated linearly between its rows.
 pub(super) fn resampled(
     times: impl IntoIterator<Item = f64>,
     rows: &[f64],

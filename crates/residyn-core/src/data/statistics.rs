@@ -1,7 +1,7 @@
 //! Medians, quantiles, spreads and intervals, for every room that needs them.
 //!
-//! Ties and NaN are ordered by [`f64::total_cmp`]. What is 0 for an empty sample says so; the rest needs at least one
-//! value.
+//! Ties and NaN are ordered by [`f64::total_cmp`]. Functions that return 0 for an empty sample say so; the others need
+//! at least one value.
 
 use rand::{Rng, RngExt};
 
@@ -14,27 +14,27 @@ const NORMAL_95: f64 = 1.959_963_984_540_054;
 /// Resamples of a bootstrap: its 95 % interval then ends at the 51st value from either side.
 const RESAMPLES: usize = 2000;
 
-/// Arithmetic mean; NaN of no values.
+/// Arithmetic mean; NaN for no values.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Root mean square; NaN of no values.
+/// Root mean square; NaN for no values.
 pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Standard deviation of the values as a whole population (divided by n); NaN of no values.
+/// Standard deviation of the values as a whole population (divided by n); NaN for no values.
 pub(crate) fn deviation(values: &[f64]) -> f64 {
     (squares_about_mean(values) / values.len() as f64).sqrt()
 }
 
-/// Standard deviation estimated from a sample (divided by n - 1); 0 of a single value.
+/// Standard deviation estimated from a sample (divided by n - 1); 0 for a single value.
 pub fn sample_deviation(values: &[f64]) -> f64 {
     sample_variance(values).sqrt()
 }
 
-/// Standard error of the mean of a sample; 0 of a single value.
+/// Standard error of the mean of a sample; 0 for a single value.
 pub fn standard_error(values: &[f64]) -> f64 {
     (sample_variance(values) / values.len() as f64).sqrt()
 }
@@ -48,12 +48,12 @@ fn squares_about_mean(values: &[f64]) -> f64 {
     values.iter().map(|value| (value - mean).powi(2)).sum()
 }
 
-/// The middle value, or the mean of the two middle ones; 0 of no values.
+/// The middle value, or the mean of the two middle ones; 0 for no values.
 pub fn median(values: &[f64]) -> f64 {
     median_of(values.to_vec())
 }
 
-/// [`median`] of values that nobody needs in their order.
+/// [`median`] of values whose order need not be kept.
 pub(crate) fn median_of(mut values: Vec<f64>) -> f64 {
     let (half, even) = (values.len() / 2, values.len().is_multiple_of(2));
     if values.is_empty() {
@@ -67,7 +67,7 @@ pub(crate) fn median_of(mut values: Vec<f64>) -> f64 {
 }
 
 /// The middle value, or the upper of the two middle ones: the robust scale of a fit, where their mean would cost a
-/// second pass and say no more. 0 of no values.
+/// second pass and say no more. 0 for no values.
 pub(crate) fn upper_median(values: &[f64]) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -75,13 +75,13 @@ pub(crate) fn upper_median(values: &[f64]) -> f64 {
     nth(values, values.len() / 2)
 }
 
-/// Median absolute deviation from the median; 0 of no values.
+/// Median absolute deviation from the median; 0 for no values.
 pub(crate) fn mad(values: &[f64]) -> f64 {
     let centre = median(values);
     median_of(values.iter().map(|value| (value - centre).abs()).collect())
 }
 
-/// The value at the place nearest to `share` (0 to 1) of the way from the lowest to the highest; 0 of no values.
+/// The value at the place nearest to `share` (0 to 1) of the way from the lowest to the highest; 0 for no values.
 pub fn quantile(values: &[f64], share: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -90,8 +90,8 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
     nth(values, place)
 }
 
-/// The lowest value that at least a `share` (0 to 1) of the values do not exceed (type 1 of Hyndman and Fan 1996); 0 of
-/// no values.
+/// The lowest value that at least a `share` (0 to 1) of the values do not exceed (type 1 of Hyndman and Fan 1996); 0
+/// for no values.
 pub fn rank_quantile(values: &[f64], share: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -139,7 +139,7 @@ pub fn bootstrap(
     [values[tail], values[RESAMPLES - 1 - tail]]
 }
 
-/// 95 % interval of a probability that `hits` of `trials` show (Wilson 1927); 0 to 1 without a trial.
+/// 95 % interval of a probability from `hits` in `trials` (Wilson 1927); 0 to 1 without a trial.
 pub fn wilson(hits: usize, trials: usize) -> [f64; 2] {
     if trials == 0 {
         return [0.0, 1.0];
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn intervals_are_those_of_the_normal_distribution_where_samples_are_many() {
-        // 0, 1, ..., 999: the mean of so many is normal, with a deviation of 288.8 / sqrt(1000).
+        // 0, 1, ..., 999: the mean of this many is normal, with a deviation of 288.8 / sqrt(1000).
         let values: Vec<f64> = (0..1000).map(f64::from).collect();
         assert!((sample_deviation(&values) - 288.8).abs() < 0.1);
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);

@@ -12,10 +12,10 @@ pub trait Table {
     /// Where the names are.
     fn head(&self) -> Place;
 
-    /// What the numbers of a log of it may take \[bytes\].
+    /// Memory that the numbers of a log from it may take \[bytes\].
     fn most_bytes(&self) -> u64;
 
-    /// The numbers of these columns, in this order. They may be asked for once.
+    /// The numbers of these columns, in this order. They can be requested only once.
     ///
     /// # Errors
     /// A file that cannot be read to its end.
@@ -24,7 +24,7 @@ pub trait Table {
     /// Where a row is.
     ///
     /// # Errors
-    /// A file that cannot be read once more.
+    /// A file that cannot be read again.
     fn place(&self, row: usize) -> Result<Place, LogError>;
 
     /// What a reader of the log should know about how the file was read.
@@ -33,16 +33,17 @@ pub trait Table {
     }
 }
 
-/// Columns of a table, each as far as it can be read.
+/// Columns of a table, each up to the first cell that cannot be read.
 pub struct Numbers {
-    /// Of the table.
+    /// Number of rows of the table.
     pub rows: usize,
     pub columns: Vec<Numeric>,
-    /// The first row that has not one cell for each name, and how many it has. Nothing is read from there on.
+    /// The first row that does not have one cell for each name, and how many cells it has. Nothing is read from there
+    /// on.
     pub ragged: Option<(usize, usize)>,
 }
 
-/// The numbers of a column up to its first cell that is no finite number, and what is wrong with that.
+/// The numbers of a column up to its first cell that is not a finite number, and what is wrong with that cell.
 #[derive(Clone, Default)]
 pub struct Numeric {
     pub values: Vec<f64>,
@@ -50,7 +51,7 @@ pub struct Numeric {
 }
 
 impl Numbers {
-    /// No row of so many columns.
+    /// This many columns without rows.
     pub fn of(columns: usize) -> Self {
         Self {
             rows: 0,
@@ -72,7 +73,7 @@ impl Numeric {
     }
 }
 
-/// Columns of numbers in memory, those that are shorter than others with empty cells at their ends.
+/// Columns of numbers in memory; those that are shorter than others have empty cells at their ends.
 #[derive(Debug)]
 pub struct Arrays {
     names: Vec<String>,
@@ -83,7 +84,7 @@ pub struct Arrays {
 }
 
 impl Arrays {
-    /// No column yet of a file of so many bytes.
+    /// No columns yet, for a file of this many bytes.
     pub fn of(packed: u64) -> Self {
         Self {
             names: Vec::new(),
@@ -114,7 +115,7 @@ impl Table for Arrays {
 
     fn numbers(&mut self, wanted: &[usize]) -> Result<Numbers, LogError> {
         let rows = self.columns.iter().map(Vec::len).max().unwrap_or(0);
-        // Those that nothing asks for are not kept.
+        // Columns that are not requested are not kept.
         let mut columns = mem::take(&mut self.columns);
         let column = |(asked, index): (usize, &usize)| {
             let is_asked_again = wanted[asked + 1..].contains(index);
@@ -141,7 +142,7 @@ impl Table for Arrays {
 }
 
 impl Numeric {
-    /// A column of a table of so many rows.
+    /// A column of a table with this many rows.
     fn of(mut values: Vec<f64>, rows: usize) -> Self {
         let bad = values.iter().position(|value| !value.is_finite());
         let fault = match bad {

@@ -16,16 +16,16 @@ pub struct Trajectory {
 /// How a log becomes trajectories.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Thinning {
-    /// Rows closer than this \[s\] are merged, with their mean torque: a network is to learn a force, not
-    /// the encoder's noise.
+    /// Rows closer than this \[s\] are merged, with their mean torque: a network should learn a force, not the
+    /// encoder's noise.
     pub step_s: f64,
     /// A trajectory of this length \[s\] ends and a new one begins; infinite to cut only where data are
     /// missing.
     pub length_s: f64,
 }
 
-/// The log's motions with smoothed states, cut at gaps and at intervals that are left out. Some may be
-/// empty or of a single row.
+/// The log's motions with smoothed states, cut at gaps and at intervals that are left out. Some may be empty or have a
+/// single row.
 pub fn trajectories(log: &Log, thinning: Thinning) -> Vec<Trajectory> {
     let step = log.median_step();
     let half_width = half_width_s(step);

@@ -13,7 +13,7 @@ impl Formula {
     }
 }
 
-/// The value of a term; `None` where a name decides it.
+/// The value of a term; `None` if a name determines it.
 fn constant(term: &Term) -> Result<Option<f64>, Fault> {
     let fault = |message: String| Err((term.span.clone(), message));
     let value = match &term.kind {

@@ -5,11 +5,11 @@ use std::ops::Range;
 /// An error in a formula, and its place. [`Display`](fmt::Display) shows the formula with carets below that place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FormulaError {
-    /// The formula as written; of a long one, what is around the place.
+    /// The formula as written; of a long one, the part around the place.
     pub formula: String,
     /// Byte range of the offending place within `formula`, or of its beginning.
     pub span: Range<usize>,
-    /// The error and, where one is similar, the name that was probably meant.
+    /// The error and, if there is a similar one, the name that was probably meant.
     pub message: String,
 }
 
@@ -37,7 +37,7 @@ impl fmt::Display for FormulaError {
     }
 }
 
-/// Bytes of a formula that are shown before a place, and behind it.
+/// Bytes of a formula that are shown before and after a place.
 const SHOWN: [usize; 2] = [60, 120];
 
 /// The part of a text that is shown for a place in it.
@@ -47,7 +47,7 @@ fn around(text: &str, at: usize) -> Range<usize> {
     start..text.floor_char_boundary(at + behind)
 }
 
-/// A text that a message quotes, without the end of a long one.
+/// A text as a message quotes it: a long one is cut off.
 pub fn shortened(text: &str) -> Cow<'_, str> {
     let end = text.floor_char_boundary(SHOWN[0]);
     match end == text.len() {
@@ -59,7 +59,7 @@ pub fn shortened(text: &str) -> Cow<'_, str> {
 /// Names that are listed before a message says that there are more.
 const LISTED: usize = 40;
 
-/// `a, b, c`, of many names the first.
+/// `a, b, c`; only the first if there are many names.
 pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
     let (first, rest) = names.split_at(names.len().min(LISTED));
@@ -71,7 +71,7 @@ pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     first.join(", ") + &more
 }
 
-/// Names that are longer are compared with no other.
+/// Longer names are not compared with others.
 const LONGEST_NAME: usize = 100;
 
 /// The candidate most similar to `name`, if the difference may be a typing error.

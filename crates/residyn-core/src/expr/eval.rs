@@ -9,7 +9,7 @@ use crate::lanes::{Element, Row, Simd, Vector, WithSimd};
 #[cfg(test)]
 mod tests;
 
-/// Working memory for `W` independent evaluations of one program, vectorised where `W` is a multiple of the processor's
+/// Working memory for `W` independent evaluations of one program, vectorised if `W` is a multiple of the processor's
 /// vector length.
 #[derive(Debug, Clone)]
 pub struct Tape<'p, T, const W: usize> {
@@ -62,8 +62,8 @@ impl Program {
         self.tape_with_held(self.inputs.len())
     }
 
-    /// The same where the inputs from `held_from` on change rarely: steps that depend only on them are evaluated
-    /// again only after a call of [`Tape::inputs`]; [`Tape::moving`] gives access to the other inputs.
+    /// As [`Program::tape`] when the inputs from `held_from` on change rarely: steps that depend only on them are
+    /// evaluated again only after a call of [`Tape::inputs`]; [`Tape::moving`] gives access to the other inputs.
     pub fn tape_with_held<T: Element, const W: usize>(&self, held_from: usize) -> Tape<'_, T, W> {
         let is_held = |step: &&Step| step.first_input as usize >= held_from;
         let (mut held, mut moving): (Vec<Step>, Vec<Step>) =

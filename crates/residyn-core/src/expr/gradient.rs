@@ -2,8 +2,8 @@ use super::graph::Graph;
 use super::op::{Binary, Node, Op, Unary};
 
 impl Graph {
-    /// Reverse mode: the gradient of `sum_k seeds[k] * outputs[k]` with respect to each of `wrt`,
-    /// as further nodes of this graph, so that gradients are evaluated and printed as programs are.
+    /// Reverse mode: the gradient of `sum_k seeds[k] * outputs[k]` with respect to each of `wrt`, as further nodes of
+    /// this graph, so that gradients are evaluated and printed like programs.
     ///
     /// `sign`, comparisons and the condition of `where` count as constant.
     pub fn gradient(&mut self, outputs: &[Node], seeds: &[Node], wrt: &[Node]) -> Vec<Node> {
@@ -133,7 +133,8 @@ impl Graph {
         }
     }
 
-    /// d(a^b) = b a^(b-1) da + a^b log(a) db; the second part only where the power is not a constant. It tends to 0 with a.
+    /// d(a^b) = b a^(b-1) da + a^b log(a) db; the second part only if the power is not a constant. It tends to 0 with
+    /// a.
     fn power_parts(&mut self, a: Node, b: Node, node: Node, adjoint: Node) -> Vec<(Node, Node)> {
         let one = self.constant(1.0);
         let less = self.sub(b, one);
@@ -149,7 +150,7 @@ impl Graph {
         parts
     }
 
-    /// `value`, or 0 where `a` is 0; what is not a number stays so.
+    /// `value`, or 0 where `a` is 0; NaN stays NaN.
     fn zero_at_zero(&mut self, a: Node, value: Node) -> Node {
         let sign = self.unary(Unary::Sign, a);
         let size = self.unary(Unary::Abs, sign);

@@ -3,8 +3,9 @@ use std::collections::HashMap;
 use super::Program;
 use super::op::{Binary, Node, Op, Unary};
 
-/// A program under construction. Equal operations are stored once (hash-consing), constants are folded to finite ones, the
-/// only ones that can be written, and operands precede the operations that use them, so that the list is in evaluation order.
+/// A program under construction. Equal operations are stored once (hash-consing), constants are folded if the result is
+/// finite, since only finite constants can be written, and operands precede the operations that use them, so that the
+/// list is in evaluation order.
 #[derive(Debug, Clone, Default)]
 pub struct Graph {
     pub(super) ops: Vec<Op>,

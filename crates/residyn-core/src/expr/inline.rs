@@ -2,8 +2,8 @@ use super::op::{Node, Op};
 use super::{Graph, Program};
 
 impl Graph {
-    /// Write `program` into this graph with its inputs replaced by `inputs`, so that programs can be
-    /// built upon programs. Returns the nodes of its outputs; its labels come along.
+    /// Write `program` into this graph with its inputs replaced by `inputs`, so that programs can be built upon
+    /// programs. Returns the nodes of its outputs; its labels are kept.
     ///
     /// # Panics
     /// When `inputs` is not as long as [`Program::inputs`].

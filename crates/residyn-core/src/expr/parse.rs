@@ -17,7 +17,7 @@ pub struct Formula {
 pub(super) struct Term {
     pub(super) kind: Kind,
     pub(super) span: Range<usize>,
-    /// Terms that stand below each other, this one included: what walks the tree calls itself as often.
+    /// Nested terms from here down, this one included: the recursion depth of a walk over the tree.
     height: usize,
 }
 
@@ -67,7 +67,7 @@ impl Formula {
 }
 
 impl Kind {
-    /// Of the highest operand; 0 without one.
+    /// Height of the tallest operand; 0 without one.
     fn height(&self) -> usize {
         match self {
             Self::Number(_) | Self::Name(_) => 0,
@@ -95,7 +95,7 @@ impl Term {
 
 /// Parse a formula such as `C_g * sin(q1) - max(0, b*qd1)^2`.
 ///
-/// Operators by rising precedence: `< > <= >=`, `+ -`, `* /`, unary `-`, `^` (to the right).
+/// Operators by rising precedence: `< > <= >=`, `+ -`, `* /`, unary `-`, `^` (right-associative).
 ///
 /// # Errors
 /// A [`FormulaError`] that points at the first place that cannot be parsed, or that lies too deep ([`crate::limits`]).
@@ -119,7 +119,7 @@ pub fn parse(text: &str) -> Result<Formula, FormulaError> {
     })
 }
 
-/// [`parse`] of what a person wrote: no part of it may be infinite or no number whatever the names stand for.
+/// [`parse`] for what a person wrote: no part of it may be infinite or NaN, whatever the names stand for.
 ///
 /// # Errors
 /// As [`parse`], and the first such part.
@@ -132,7 +132,7 @@ pub fn parse_finite(text: &str) -> Result<Formula, FormulaError> {
 struct Parser<'a> {
     text: &'a str,
     at: usize,
-    /// Operands within each other here.
+    /// Nesting depth of operands here.
     depth: usize,
     terms: usize,
 }
@@ -352,7 +352,7 @@ impl<'a> Parser<'a> {
         self.error_at(self.at..self.at + width, message)
     }
 
-    /// What follows a whole term within a parenthesis that opens at `open`, where it is none of `wanted` and no `)`.
+    /// The error when a whole term in a parenthesis opened at `open` is followed by neither `wanted` nor `)`.
     fn unclosed(&self, open: usize, wanted: &str) -> FormulaError {
         match self.rest().chars().next() {
             Some(found) => self.error_here(format!("expected {wanted}, or `)`, found `{found}`")),
@@ -428,15 +428,15 @@ mod tests {
         for (open, close) in [("(", ")"), ("-", ""), ("+", ""), ("sin(", ")"), ("a^", "")] {
             assert!(parse(&of(open, close, 199)).is_ok(), "{open}");
             for times in [200, 300_000] {
-                let told = message(&of(open, close, times));
-                assert!(told.contains("more than 200 parentheses"), "{told}");
-                assert!(told.len() < 400, "{told}");
+                let message = message(&of(open, close, times));
+                assert!(message.contains("more than 200 parentheses"), "{message}");
+                assert!(message.len() < 400, "{message}");
             }
         }
         for operation in ["a+", "a*", "a<"] {
             assert_eq!(parse(&of(operation, "", 999)).unwrap().terms(), 1999);
-            let told = message(&of(operation, "", 300_000));
-            assert!(told.contains("more than 1000 operations"), "{told}");
+            let message = message(&of(operation, "", 300_000));
+            assert!(message.contains("more than 1000 operations"), "{message}");
         }
     }
 }

@@ -45,7 +45,7 @@ impl Places {
         }
     }
 
-    /// The same for steps whose results, unless permanent, are needed only until their last reader.
+    /// As [`Places::settle`] for steps whose results, unless permanent, are needed only until their last reader.
     pub fn pass(&mut self, steps: &mut [Step]) {
         let mut last = vec![usize::MAX; self.of.len()];
         for (index, step) in steps.iter().enumerate() {

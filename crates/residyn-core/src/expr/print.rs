@@ -25,8 +25,8 @@ impl Program {
         self.lines_with(notation, &self.shared(0), names)
     }
 
-    /// The labels, and names for whatever else is used more than once and has more than `terms` inputs and constants when it
-    /// is written out.
+    /// The labels, and names for other values that are used more than once and have more than `terms` inputs and
+    /// constants when written out.
     fn shared(&self, terms: usize) -> Vec<(Node, String)> {
         let mut taken: HashSet<String> = self.inputs.iter().cloned().collect();
         taken.extend(self.labels.iter().map(|(_, label)| label.clone()));
@@ -89,7 +89,7 @@ impl Program {
         !matches!(self.ops[node.index()], Op::Const(_) | Op::Input(_))
     }
 
-    /// Each node printed once, those with a name in a line of their own.
+    /// Each node printed once, those with a name on a line of their own.
     fn written(&self, notation: &dyn Notation, named: &[(Node, String)]) -> Written {
         let mut names: HashMap<usize, &str> = HashMap::new();
         for (node, name) in named.iter().filter(|(node, _)| self.is_step(*node)) {
@@ -156,7 +156,7 @@ struct Written {
     outputs: Vec<String>,
 }
 
-/// The nodes that are printed so far.
+/// The nodes printed so far.
 struct Parts {
     parts: Vec<Part>,
     /// How often each is still to be written.
@@ -164,8 +164,8 @@ struct Parts {
 }
 
 impl Parts {
-    /// The text of a node: handed over where it is written for the last time, since a sum of many terms would otherwise be
-    /// copied with each of them.
+    /// The text of a node: moved when it is written for the last time, since a sum of many terms would otherwise be
+    /// copied with each term.
     fn take(&mut self, node: Node) -> Part {
         let (part, uses) = (&mut self.parts[node.index()], &mut self.uses[node.index()]);
         *uses -= 1;

@@ -25,7 +25,7 @@ pub(super) type Fault = (Range<usize>, String);
 pub struct Scope {
     names: HashMap<String, Node>,
     sign: SignForm,
-    /// Nodes whose signs are nodes of their own.
+    /// Nodes whose signs are given as nodes.
     signs: HashMap<Node, Node>,
 }
 
@@ -33,7 +33,7 @@ impl Formula {
     /// The formula as a program of these inputs; `sign` is exact.
     ///
     /// # Errors
-    /// A name that is none of the inputs, with the nearest one.
+    /// A name that is not an input, with the nearest input.
     pub fn program<'n>(
         &self,
         inputs: impl IntoIterator<Item = &'n str>,
@@ -60,7 +60,7 @@ impl Scope {
         self.names.insert(name.to_owned(), node);
     }
 
-    /// The sign of a node is this one.
+    /// Use the node `sign` as the sign of the node `of`.
     pub fn give_sign(&mut self, of: Node, sign: Node) {
         self.signs.insert(of, sign);
     }
@@ -82,7 +82,7 @@ impl Scope {
     /// Write the formula into the graph.
     ///
     /// # Errors
-    /// A name that the scope does not know, with the nearest one that it does.
+    /// A name that the scope does not know, with the nearest one that it knows.
     pub fn lower(&self, graph: &mut Graph, formula: &Formula) -> Result<Node, FormulaError> {
         self.term(graph, &formula.root)
             .map_err(|(span, message)| FormulaError::new(&formula.text, span, message))

@@ -47,8 +47,8 @@ pub(super) struct Steps {
 }
 
 /// Products and negations that are used only once are fused into sums, the sine and cosine of one angle are computed
-/// together, and divisions by the same value share its reciprocal. Steps of one kind are grouped as far as their
-/// dependencies allow, so that the evaluator branches once for each group.
+/// together, and divisions by the same value share its reciprocal. Steps of one kind are grouped where their
+/// dependencies allow it, so that the evaluator branches once for each group.
 pub(super) fn steps(ops: &[Op], outputs: impl Iterator<Item = usize>) -> Steps {
     let mut writer = Writer::new(ops, outputs);
     for (place, op) in ops.iter().enumerate() {
@@ -147,7 +147,7 @@ impl<'o> Writer<'o> {
         }));
     }
 
-    /// The first of a sine and a cosine of one angle computes both.
+    /// Whichever of an angle's sine and cosine comes first computes both.
     fn wave(&mut self, place: usize, op: Unary, angle: u32) {
         match self.waves[&angle] {
             [Some(sine), Some(cosine)] if place == sine.min(cosine) => {
@@ -188,7 +188,7 @@ impl<'o> Writer<'o> {
         step.take_if(|step| step.kind == kind && self.uses[place] == 1)
     }
 
-    /// The place of 1 / value where several divisions share it or the value is constant.
+    /// The place of 1 / value if several divisions share it or the value is constant.
     fn reciprocal(&mut self, of: u32) -> Option<u32> {
         if let Some(known) = self.reciprocals.get(&of) {
             return Some(*known);
@@ -233,8 +233,7 @@ impl Step {
     }
 }
 
-/// Topological order that groups steps of one kind: repeatedly take all ready steps of the kind of which most are
-/// ready.
+/// Topological order that groups steps of one kind: repeatedly take all ready steps of the kind that has most ready.
 fn grouped(steps: &[Step]) -> Vec<Step> {
     let writers: HashMap<u32, usize> = (steps.iter().enumerate())
         .flat_map(|(index, step)| step.writes().map(move |place| (place, index)))

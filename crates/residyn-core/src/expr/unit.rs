@@ -1,6 +1,6 @@
 use std::fmt;
 
-/// The base units, and the radian, which is one for the FMI standard.
+/// The base units, and the radian, which the FMI standard counts as one.
 pub const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
 /// Exponents of the units in [`BASE`].
@@ -23,14 +23,14 @@ const DERIVED: [(&str, [i32; 4]); 9] = [
     ("1", [0, 0, 0, 0]),
 ];
 
-/// What is easier to read than its base units.
+/// Units that are easier to read than their base units.
 const READABLE: [&str; 9] = ["1", "N", "N m", "W", "V", "V/A", "N m/A", "N m s", "N/m"];
 
 impl Unit {
-    /// That of pure numbers.
+    /// The unit of pure numbers.
     pub const ONE: Self = Self([0; BASE.len()]);
 
-    /// A unit such as `N m s^2/rad` or `1/(kg m^2)`; none for one that is not SI.
+    /// A unit such as `N m s^2/rad` or `1/(kg m^2)`; `None` for a unit that is not SI.
     pub fn parse(text: &str) -> Option<Self> {
         let mut rest = text;
         let exponents = product(&mut rest)?;
@@ -42,7 +42,7 @@ impl Unit {
         self.0
     }
 
-    /// The same unit where angles are pure numbers.
+    /// The same unit with angles as pure numbers.
     #[must_use]
     pub fn without_angle(self) -> Self {
         let [base @ .., _] = self.0;
@@ -66,7 +66,7 @@ impl Unit {
         Self(self.0.map(|e| e * exponent))
     }
 
-    /// The unit whose square this is, where there is one.
+    /// The unit whose square this is, if there is one.
     pub fn root(self) -> Option<Self> {
         let is_square = self.0.iter().all(|e| e % 2 == 0);
         is_square.then(|| Self(self.0.map(|e| e / 2)))

@@ -10,8 +10,8 @@ impl Formula {
     /// The unit of the formula's value, and every place where units do not fit. `of` is the unit of a name, angles being pure
     /// numbers.
     ///
-    /// A unit is `None` where nothing tells it. A number may carry any unit, as lengths do in formulas that were derived from a
-    /// drawing, and so may a product with it. A sum has the unit of those of its parts that have one.
+    /// A unit is `None` if nothing determines it. A number may carry any unit, as lengths do in formulas derived from a
+    /// drawing, and so may a product with it. A sum has the unit of the parts that have one.
     pub fn unit(&self, of: &dyn Fn(&str) -> Option<Unit>) -> (Option<Unit>, Vec<FormulaError>) {
         let mut reader = Reader {
             text: &self.text,
@@ -52,7 +52,7 @@ impl Reader<'_> {
             }
             Infix::Plain(Binary::Pow) => self.power(whole, a, b),
             Infix::Plain(Binary::Add | Binary::Sub) => self.alike([a, b]),
-            // What is left are comparisons.
+            // The rest are comparisons.
             _ => {
                 self.alike([a, b]);
                 Some(Unit::ONE)
@@ -94,12 +94,12 @@ impl Reader<'_> {
             match known {
                 None => known = Some((term, unit)),
                 Some((first, of_first)) if of_first != unit => {
-                    let told = format!(
+                    let message = format!(
                         "{} and {} cannot be added or compared",
                         self.with_unit(first, of_first),
                         self.with_unit(term, unit)
                     );
-                    self.tell(term, told);
+                    self.tell(term, message);
                 }
                 Some(_) => {}
             }
@@ -107,15 +107,15 @@ impl Reader<'_> {
         known.map(|(_, unit)| unit)
     }
 
-    /// An argument of a function, or an exponent, that has to be a pure number or an angle.
+    /// An argument of a function, or an exponent, that must be a pure number or an angle.
     fn pure(&mut self, term: &Term, of: &Term) {
         if let Some(unit) = self.term(term).filter(|unit| *unit != Unit::ONE) {
-            let told = format!(
+            let message = format!(
                 "{} in `{}` has to be a pure number or an angle",
                 self.with_unit(term, unit),
                 shortened(&self.text[of.span.clone()])
             );
-            self.tell(term, told);
+            self.tell(term, message);
         }
     }
 
@@ -151,7 +151,7 @@ mod tests {
     use super::Unit;
     use crate::expr::parse;
 
-    /// The unit of a formula of a pendulum, and what is told of its misfits.
+    /// The unit of a formula of a pendulum, and the messages about its misfits.
     fn of(formula: &str) -> (Option<String>, Vec<String>) {
         let unit = |name: &str| match name {
             "m" => Unit::parse("kg"),
@@ -162,8 +162,8 @@ mod tests {
             _ => None,
         };
         let (unit, misfits) = parse(formula).unwrap().unit(&unit);
-        let told = misfits.into_iter().map(|misfit| misfit.message);
-        (unit.map(|unit| unit.to_string()), told.collect())
+        let message = misfits.into_iter().map(|misfit| misfit.message);
+        (unit.map(|unit| unit.to_string()), message.collect())
     }
 
     #[test]
@@ -186,8 +186,8 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_told_with_its_units() {
-        for (formula, told) in [
+    fn what_does_not_fit_is_reported_with_its_units() {
+        for (formula, message) in [
             ("m*g*l + m*g", "`m*g*l` [N m] and `m*g` [N] cannot be added"),
             ("sin(l)", "`l` [m] in `sin(l)` has to be a pure number"),
             ("2^m", "`m` [kg] in `2^m` has to be a pure number"),
@@ -195,7 +195,7 @@ mod tests {
             ("where(qd1 > g, 1, 2)", "`qd1` [1/s] and `g` [m/s^2] cannot"),
         ] {
             let (_, misfits) = of(formula);
-            assert!(misfits[0].starts_with(told), "{misfits:?}");
+            assert!(misfits[0].starts_with(message), "{misfits:?}");
         }
     }
 }

@@ -10,18 +10,18 @@ use crate::lanes::Row;
 use crate::model::Dynamics;
 use crate::sim::{Commands, Delivered, Point, Window};
 
-/// A log as the error of torques reads it, thinned out.
+/// A log as the torque error reads it, thinned out.
 pub(super) struct Rows {
     smooth: Smooth,
     smoothing: Smoothing,
 }
 
 impl Rows {
-    /// Friction reverses over these speeds, one a joint.
-    pub fn of(log: &Log, sign_widths: &[f64]) -> Self {
+    /// Friction reverses over these speeds, one per joint.
+    pub fn of(log: &Log, smoothing_velocities: &[f64]) -> Self {
         let smoothing = Smoothing::of(log).thinned();
         Self {
-            smooth: Smooth::by(&smoothing, log, sign_widths),
+            smooth: Smooth::by(&smoothing, log, smoothing_velocities),
             smoothing,
         }
     }
@@ -33,8 +33,8 @@ impl Rows {
     }
 }
 
-/// The torques that act in each log at its rows, `[log][joint][row]`, and their slopes by the model's filters,
-/// `[log][filter][row]`.
+/// The torques that act in each log at its rows, `[log][joint][row]`, and their slopes with respect to the model's
+/// filter parameters, `[log][filter][row]`.
 pub(super) struct Acting {
     tau: Vec<Vec<Vec<f64>>>,
     slopes: Vec<Vec<Vec<f64>>>,
@@ -72,7 +72,7 @@ impl Acting {
     }
 }
 
-/// Up to [`LANES`] windows side by side. Shorter ones are padded with rows of zero weight.
+/// Up to [`LANES`] windows side by side. Shorter windows are padded with rows of zero weight.
 pub(super) struct Balance {
     pub windows: Vec<usize>,
     /// The log of each lane.
@@ -119,8 +119,8 @@ impl Balance {
         self.at.iter().flatten().flatten().count()
     }
 
-    /// Evaluate a program at each row, calling `see(lanes, tape)`, where `lanes` are those that have such a row. A program may
-    /// take the slopes of the torques by the model's filters before its parameters.
+    /// Evaluate a program at each row, calling `see(lanes, tape)`, where `lanes` gives each lane's row, if it has one.
+    /// A program may take the slopes of the torques with respect to filter parameters before its parameters.
     fn over_rows<'t>(
         &self,
         mut tape: Tape<'t, f64, LANES>,

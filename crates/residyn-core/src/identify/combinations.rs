@@ -1,5 +1,5 @@
 //! Which combinations of the bodies' parameters the logs tell: base parameters (Gautier 1991), found from the information that a
-//! fit has, so that what the motion does not excite is left out as well as what no motion could.
+//! fit has, so that combinations that the motion does not excite are left out, as well as those that no motion could.
 
 use nalgebra::DMatrix;
 use rand::SeedableRng;
@@ -14,44 +14,45 @@ use super::values::{Column, Values};
 use crate::lanes::Row;
 use crate::model::{Dynamics, Model, Parameter};
 
-/// A parameter of a body with what moves the same torques as it does, in these logs.
+/// A body's parameter together with the parameters that affect the torques of these logs in the same way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Combination {
-    /// Number of the first body that it is of, 0 next to the base.
+    /// Number of the first body in it, 0 next to the base.
     pub body: usize,
-    /// Parameters and their weights in the sum; that of the first is 1.
+    /// Parameters and their weights in the sum; the first weight is 1.
     pub parts: Vec<(String, f64)>,
-    /// Of the first parameter and of the sum.
+    /// Unit of the first parameter and of the sum.
     pub unit: String,
     /// The sum of the declared values.
     pub declared: f64,
-    /// The sum of the fitted ones.
+    /// The sum of the fitted values.
     pub value: f64,
     pub ci95: [f64; 2],
 }
 
-/// A parameter is told apart if the logs alone give it a standard deviation below what its body has of its kind: this much
-/// information, in units of that.
-const TOLD: f64 = 1.0;
-/// It is not if its information is smaller than this share of what it has alone: then it is rounding.
+/// A parameter is distinguished if the logs alone give it a standard deviation below its body's magnitude of its kind:
+/// at least this much information, in units of that magnitude.
+const IDENTIFIABLE: f64 = 1.0;
+/// It is not if its information is smaller than this share of what it has alone: then it is rounding error.
 const ROUNDING: f64 = 1e-9;
-/// What changes a sum by less than this share of what the body has of its first parameter's kind is not listed.
+/// Parameters that change a sum by less than this share of the body's magnitude of the first parameter's kind are not
+/// listed.
 const LISTED: f64 = 0.02;
 
-/// What logs tell of the bodies of a chain.
+/// What logs determine of a chain's bodies.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct BodiesTold {
-    /// The sums that they tell, body by body from the base to the tip.
-    pub told: Vec<Combination>,
-    /// How many any motion could tell.
-    pub tellable: usize,
+pub struct IdentifiableBodies {
+    /// The sums that they determine, body by body from the base to the tip.
+    pub identifiable: Vec<Combination>,
+    /// How many sums any motion could determine.
+    pub identifiable_at_most: usize,
 }
 
-/// The bodies of a fit's model, and which of its columns are theirs.
+/// The bodies of a fit's model, and which of its columns belong to them.
 struct Columns<'a> {
     fit: &'a Fit,
     dynamics: &'a Dynamics,
-    /// Body and part of each column that is of a body.
+    /// Body and part of each column that belongs to a body.
     places: Vec<Option<(usize, usize)>>,
     sizes: Vec<[f64; PARTS]>,
 }
@@ -73,7 +74,7 @@ impl<'a> Columns<'a> {
         }
     }
 
-    /// What the body has of the column's kind, or the scale of a value that is of none.
+    /// The body's magnitude of the column's kind, or the scale of a value that belongs to no body.
     fn magnitude(&self, column: usize) -> f64 {
         let parameter = self.fit.columns[column].parameter;
         self.places[column].map_or(self.dynamics.parameters[parameter].scale, |(body, part)| {
@@ -88,7 +89,8 @@ impl<'a> Columns<'a> {
         })
     }
 
-    /// A column that is told, and those of bodies that join it in a sum, with their weights in the columns' own units.
+    /// An identifiable column and the columns of bodies that join it in a sum, with their weights in the columns'
+    /// units.
     fn joined(&self, weights: &Weights, row: usize, first: usize) -> Vec<(usize, f64)> {
         let others = weights.others.iter().enumerate();
         let joins = others
@@ -101,7 +103,8 @@ impl<'a> Columns<'a> {
         [(first, 1.0)].into_iter().chain(joins).collect()
     }
 
-    /// The sum of these columns; `None` for one that no body is in, or a parameter of an effect, which nothing declares.
+    /// The sum of these columns; `None` for a sum without a body or with an effect's parameter, which has no declared
+    /// value.
     fn sum(
         &self,
         weighed: &[(usize, f64)],
@@ -130,8 +133,8 @@ impl<'a> Columns<'a> {
         })
     }
 
-    /// Those of the declared equations that are of no body, those of each body, and those of effects: a load at the tip is told
-    /// beside the bodies, and not they beside it.
+    /// The columns of the declared equations outside any body, those of each body, and those of effects: a load at the
+    /// tip is determined given the bodies, not the bodies given the load.
     fn groups(&self, declared: &Model) -> Vec<Vec<usize>> {
         let end = declared.parameters.len();
         let rank = |column: usize| match self.places[column] {
@@ -149,40 +152,42 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// What the logs of a fit by torques tell of the bodies of its model; nothing for one whose bodies are fixed, or that has none.
-pub fn bodies_told(
+/// What the logs of a fit to torques determine of its model's bodies; empty for a model whose bodies are fixed, or that
+/// has none.
+pub fn identifiable_bodies(
     dynamics: &Dynamics,
     declared: &Model,
     found: &Values,
     fit: &Fit,
     uncertainty: &Uncertainty,
-) -> BodiesTold {
+) -> IdentifiableBodies {
     let columns = Columns::of(fit, dynamics, declared);
     if columns.places.iter().all(Option::is_none) {
-        return BodiesTold::default();
+        return IdentifiableBodies::default();
     }
     let relative = columns.relative(&fit.equations().hessian);
-    let told = told_apart(&relative, &columns.groups(declared), TOLD);
-    let Some(weights) = weights(&relative, &told) else {
-        return BodiesTold::default();
+    let identifiable = distinguished(&relative, &columns.groups(declared), IDENTIFIABLE);
+    let Some(weights) = weights(&relative, &identifiable) else {
+        return IdentifiableBodies::default();
     };
     let sum = |(row, &first): (usize, &usize)| {
         let weighed = columns.joined(&weights, row, first);
         columns.sum(&weighed, (declared, found), uncertainty)
     };
-    let mut told: Vec<Combination> = told.iter().enumerate().filter_map(sum).collect();
-    told.sort_by_key(|combination| combination.body);
-    BodiesTold {
-        told,
-        tellable: tellable(&columns),
+    let mut identifiable: Vec<Combination> =
+        identifiable.iter().enumerate().filter_map(sum).collect();
+    identifiable.sort_by_key(|combination| combination.body);
+    IdentifiableBodies {
+        identifiable,
+        identifiable_at_most: identifiable_at_most(&columns),
     }
 }
 
-/// Rows of states drawn at random, some for each free value.
+/// Number of rows of random states.
 const ROWS: usize = 64;
 
-/// How many sums of the bodies' parameters show in torques of states drawn at random.
-fn tellable(columns: &Columns<'_>) -> usize {
+/// How many sums of the bodies' parameters show in the torques of random states.
+fn identifiable_at_most(columns: &Columns<'_>) -> usize {
     let is_of_body = |i: &usize| columns.places[*i].is_some();
     let own: Vec<usize> = (0..columns.places.len()).filter(is_of_body).collect();
     let active: Vec<usize> = own
@@ -199,7 +204,7 @@ fn tellable(columns: &Columns<'_>) -> usize {
         *slot = Row::splat(value);
     }
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    // Of all columns: none for those that are of no body.
+    // For all columns: zero for those that belong to no body.
     let mut information = DMatrix::<f64>::zeros(columns.places.len(), columns.places.len());
     for _ in 0..ROWS {
         for slot in &mut tape.inputs()[..first] {
@@ -217,10 +222,10 @@ fn tellable(columns: &Columns<'_>) -> usize {
             }
         }
     }
-    told_apart(&columns.relative(&information), &[own], 0.0).len()
+    distinguished(&columns.relative(&information), &[own], 0.0).len()
 }
 
-/// What a body has of each kind: its mass, and that with its radius of gyration and its square.
+/// A body's magnitude of each kind: mass, mass times radius of gyration, and mass times that radius squared.
 fn sizes(declared: &Model, body: &[usize; PARTS]) -> [f64; PARTS] {
     let value = |part: usize| declared.parameters[body[part]].value.abs();
     let (mass, trace) = (value(0), value(4) + value(7) + value(9));
@@ -231,11 +236,11 @@ fn sizes(declared: &Model, body: &[usize; PARTS]) -> [f64; PARTS] {
     })
 }
 
-/// Columns that are told apart, with at least this information; those of the first group before those of the next, in each
-/// the one that is told best first.
-fn told_apart(relative: &DMatrix<f64>, groups: &[Vec<usize>], least: f64) -> Vec<usize> {
+/// Columns that are distinguished, with at least this information; the first group before the next, and in each group
+/// the best determined column first.
+fn distinguished(relative: &DMatrix<f64>, groups: &[Vec<usize>], least: f64) -> Vec<usize> {
     let mut left = relative.clone();
-    let mut told = Vec::new();
+    let mut identifiable = Vec::new();
     for group in groups {
         let mut open = group.clone();
         while let Some(at) = (0..open.len()).max_by(|a, b| {
@@ -250,25 +255,27 @@ fn told_apart(relative: &DMatrix<f64>, groups: &[Vec<usize>], least: f64) -> Vec
             }
             let row = left.row(next).clone_owned();
             left -= row.transpose() * &row / information;
-            told.push(next);
+            identifiable.push(next);
         }
     }
-    told
+    identifiable
 }
 
-/// By how much each column that is told stands for the others.
+/// By how much each identifiable column stands for the others.
 struct Weights {
     others: Vec<usize>,
-    /// In units of the magnitudes, one row for each that is told and one column for each other.
+    /// In units of the magnitudes, one row per identifiable column and one column per other one.
     of: DMatrix<f64>,
 }
 
-fn weights(relative: &DMatrix<f64>, told: &[usize]) -> Option<Weights> {
+fn weights(relative: &DMatrix<f64>, identifiable: &[usize]) -> Option<Weights> {
     let others: Vec<usize> = (0..relative.nrows())
-        .filter(|i| !told.contains(i))
+        .filter(|i| !identifiable.contains(i))
         .collect();
-    let known = relative.select_rows(told).select_columns(told);
-    let cross = relative.select_rows(told).select_columns(&others);
+    let known = relative
+        .select_rows(identifiable)
+        .select_columns(identifiable);
+    let cross = relative.select_rows(identifiable).select_columns(&others);
     Some(Weights {
         of: known.cholesky()?.solve(&cross),
         others,
@@ -279,9 +286,9 @@ fn weights(relative: &DMatrix<f64>, told: &[usize]) -> Option<Weights> {
 mod tests {
     use nalgebra::DMatrix;
 
-    use super::{told_apart, weights};
+    use super::{distinguished, weights};
 
-    /// Three values of which the second and the third enter as b + 2 c alone, and one that does not show.
+    /// Three values, the second and third of which enter only as b + 2 c, and one that does not show.
     #[test]
     fn what_enters_as_a_sum_is_told_as_a_sum() {
         let rows = DMatrix::from_row_slice(
@@ -292,10 +299,10 @@ mod tests {
             ],
         );
         let information = rows.transpose() * &rows;
-        let told = told_apart(&information, &[vec![0], vec![1, 2, 3]], 1.0);
+        let identifiable = distinguished(&information, &[vec![0], vec![1, 2, 3]], 1.0);
         // The third shows most.
-        assert_eq!(told, [0, 2]);
-        let weights = weights(&information, &told).unwrap();
+        assert_eq!(identifiable, [0, 2]);
+        let weights = weights(&information, &identifiable).unwrap();
         assert_eq!(weights.others, [1, 3]);
         let expected = DMatrix::from_row_slice(2, 2, &[0.0, 0.0, 0.5, 0.0]);
         assert!((weights.of - expected).amax() < 1e-9);

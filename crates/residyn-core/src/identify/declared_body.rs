@@ -2,19 +2,19 @@ use nalgebra::{Cholesky, Matrix4, SMatrix, SVector, SymmetricEigen};
 
 use crate::decomposition::eigen;
 
-/// Eigenvalues of a declared pseudo-inertia below this share of its largest are raised to it: a body of no extent has none
-/// of its own kind near it.
+/// Eigenvalues of a declared pseudo-inertia below this share of its largest are raised to it: a body of no extent has
+/// none of its own kind near it.
 const LEAST_SHARE: f64 = 1e-6;
 
 /// Number of inertial parameters of a body: mass, first moments, and xx, xy, xz, yy, yz, zz of the tensor.
 pub const PARTS: usize = 10;
 
-/// What is declared of a body: values that are physical, and near those declared.
+/// The prior of a declared body: its values are physical, and near the declared ones.
 ///
-/// A body's ten inertial parameters are physical where its pseudo-inertia, a symmetric 4x4 matrix P linear in them, is positive
-/// definite. The cost of values is the relative entropy between the densities that P and the declared P0 belong to,
-/// -log det(P P0^-1) + tr(P0^-1 P) - 4: it does not depend on frames or units, is convex, and infinite where a body is not
-/// physical (Lee, Wensing, Park, Geometric robot dynamic identification, IEEE T-RO 2020).
+/// A body's ten inertial parameters are physical if its pseudo-inertia, a symmetric 4x4 matrix P linear in them, is
+/// positive definite. The cost of values is the relative entropy between the densities that P and the declared P0
+/// belong to, -log det(P P0^-1) + tr(P0^-1 P) - 4: it does not depend on frames or units, is convex, and infinite if a
+/// body is not physical (Lee, Wensing, Park, Geometric robot dynamic identification, IEEE T-RO 2020).
 #[derive(Debug, Clone)]
 pub struct DeclaredBody {
     /// The model's parameters, in the order of the parts.
@@ -24,7 +24,7 @@ pub struct DeclaredBody {
 }
 
 impl DeclaredBody {
-    /// Of these declared values; `None` for a body without mass and extent.
+    /// A body with these declared values; `None` for one without mass and extent.
     pub fn new(parameters: [usize; PARTS], declared: &[f64; PARTS]) -> Option<Self> {
         let root = Cholesky::new(physical(&pseudo(declared))?)?;
         Some(Self {
@@ -38,12 +38,12 @@ impl DeclaredBody {
     pub fn cost(&self, values: &[f64; PARTS]) -> f64 {
         let inertia = pseudo(values);
         Cholesky::new(inertia).map_or(f64::INFINITY, |root| {
-            let stretch = (self.inverse * inertia).trace();
-            stretch - 4.0 - (log_determinant(&root) - self.log_determinant)
+            let block = (self.inverse * inertia).trace();
+            block - 4.0 - (log_determinant(&root) - self.log_determinant)
         })
     }
 
-    /// Its gradient and second derivatives; `None` where the values are not physical.
+    /// Its gradient and second derivatives; `None` if the values are not physical.
     pub fn terms(
         &self,
         values: &[f64; PARTS],
@@ -59,8 +59,8 @@ impl DeclaredBody {
     }
 }
 
-/// The values of a body that is physical, the nearest to these in the pseudo-inertia's eigenvalues; `None` for a body without
-/// mass and extent.
+/// The values of the physical body nearest to these in the pseudo-inertia's eigenvalues; `None` for a body without mass
+/// and extent.
 pub fn physical_parts(parts: &[f64; PARTS]) -> Option<[f64; PARTS]> {
     let inertia = physical(&pseudo(parts))?;
     let second = inertia.fixed_view::<3, 3>(0, 0);
@@ -115,7 +115,7 @@ fn unit(part: usize) -> Matrix4<f64> {
         _ => {
             let (a, b) = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)][part - 4];
             if a == b {
-                // Half the trace of the tensor less the tensor itself.
+                // Half the trace of the tensor minus the tensor itself.
                 for c in 0..3 {
                     matrix[(c, c)] = if c == a { -0.5 } else { 0.5 };
                 }
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn what_no_body_can_be_becomes_one() {
-        // All of the mass in the joint, with an inertia about one axis alone.
+        // All of the mass in the joint, with an inertia about one axis only.
         let parts = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3];
         let body = physical_parts(&parts).unwrap();
         assert!(

@@ -3,10 +3,10 @@ use nalgebra::{DMatrix, DVector};
 use super::normal_equations::with_unit_diagonal;
 use crate::decomposition::eigen;
 
-/// A direction with a smaller eigenvalue than this, where the diagonal is one, has none but by rounding.
+/// With a unit diagonal, an eigenvalue smaller than this is rounding error.
 const ROUNDING: f64 = 1e-12;
-/// v^T M^+ v: the squared Mahalanobis distance of values from zero under a covariance, without the directions in which they
-/// have no spread; NaN where the matrix is not finite.
+/// v^T M^+ v: the squared Mahalanobis distance of values from zero under a covariance, without the directions in which
+/// they have no spread; NaN if the matrix is not finite.
 pub fn squared_distance(matrix: &DMatrix<f64>, values: &DVector<f64>) -> f64 {
     let (scaled, unit) = with_unit_diagonal(matrix);
     let Some(eigen) = eigen(scaled) else {

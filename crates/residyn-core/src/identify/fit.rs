@@ -8,27 +8,28 @@ use crate::model::Dynamics;
 /// Most steps of one fit; Gauss-Newton on such problems needs 3 to 30.
 const MOST_STEPS: usize = 100;
 
-/// Most estimates of the scale after the first fit; two or three are the rule.
+/// Most estimates of the scale after the first fit; usually two or three suffice.
 const MOST_SCALES: usize = 8;
 
-/// Fit the parameters `active` of `dynamics` to the windows, starting from its values and `locals`, with every window's
+/// Fit the parameters `active` of `dynamics` to the windows, starting from its values and `start_states`, with every window's
 /// start state (and forces) free. `scale` fixes the scale of the residuals; without it, it is estimated by their median
 /// absolute deviation as the fit proceeds. Returns the values found and how the fit ended.
 ///
 /// # Errors
-/// No window, or a model that diverges at the starting values. A fit that does not converge is no error: its
+/// No window, or a model that diverges at the starting values. A fit that does not converge is not an error: its
 /// [`Termination`] says so.
 pub fn fit(
     shooting: &Shooting<'_>,
     dynamics: &Dynamics,
     active: &[usize],
-    locals: Vec<Vec<f64>>,
+    start_states: Vec<Vec<f64>>,
     scale: Option<f64>,
 ) -> Result<(Values, Fit), FitError> {
-    let tangent = Tangent::new(dynamics, active, shooting.local(&locals));
-    let mut search = Search::new(shooting, dynamics, &tangent, locals, scale)?;
+    let tangent = Tangent::new(dynamics, active, shooting.local(&start_states));
+    let mut search = Search::new(shooting, dynamics, &tangent, start_states, scale)?;
     let mut termination = search.run(MOST_STEPS);
-    // The scale is to be that of the final residuals; the smaller it is, the less they owe to the start states' estimates.
+    // The scale must be that of the final residuals; the smaller it is, the less the start states' estimates influence
+    // them.
     for _ in 0..MOST_SCALES {
         if scale.is_some() || search.rescale() {
             break;
@@ -38,7 +39,7 @@ pub fn fit(
     Ok(search.finish(termination))
 }
 
-/// As [`fit`] at a given scale, where only a cost below `below` is of use; `None` if the cost does not come down to it.
+/// As [`fit`] at a given scale, if only a cost below `below` is of use; `None` if the cost does not reach it.
 ///
 /// # Errors
 /// As [`fit`].
@@ -46,11 +47,11 @@ pub fn fit_below(
     shooting: &Shooting<'_>,
     dynamics: &Dynamics,
     active: &[usize],
-    locals: Vec<Vec<f64>>,
+    start_states: Vec<Vec<f64>>,
     (scale, below): (f64, f64),
 ) -> Result<Option<(Values, Fit)>, FitError> {
-    let tangent = Tangent::new(dynamics, active, shooting.local(&locals));
-    let search = Search::new(shooting, dynamics, &tangent, locals, Some(scale))?;
+    let tangent = Tangent::new(dynamics, active, shooting.local(&start_states));
+    let search = Search::new(shooting, dynamics, &tangent, start_states, Some(scale))?;
     let mut search = search.only_below(below);
     let termination = search.run(MOST_STEPS);
     let found = (termination != Termination::GivenUp).then(|| search.finish(termination));
@@ -65,26 +66,26 @@ pub fn as_it_stands(
     shooting: &Shooting<'_>,
     dynamics: &Dynamics,
     active: &[usize],
-    locals: Vec<Vec<f64>>,
+    start_states: Vec<Vec<f64>>,
     scale: f64,
 ) -> Result<Fit, FitError> {
-    let tangent = Tangent::new(dynamics, active, shooting.local(&locals));
-    let search = Search::new(shooting, dynamics, &tangent, locals, Some(scale))?;
+    let tangent = Tangent::new(dynamics, active, shooting.local(&start_states));
+    let search = Search::new(shooting, dynamics, &tangent, start_states, Some(scale))?;
     let (_, fit) = search.finish(Termination::AsGiven);
     Ok(fit)
 }
 
-/// The cost that one Gauss-Newton step from the model's values is predicted to reach, within the parameters' bounds: the worth of
-/// a candidate before it is fitted. `None` where the model diverges there or the step cannot be solved for.
+/// The cost that one Gauss-Newton step from the model's values is predicted to reach, within the parameters' bounds:
+/// the worth of a candidate before it is fitted. `None` if the model diverges there or the step cannot be solved for.
 pub fn predicted_cost(
     shooting: &Shooting<'_>,
     dynamics: &Dynamics,
     active: &[usize],
-    locals: &[Vec<f64>],
+    start_states: &[Vec<f64>],
     scale: f64,
 ) -> Option<f64> {
-    let tangent = Tangent::new(dynamics, active, shooting.local(locals));
-    let locals = locals.to_vec();
-    let search = Search::new(shooting, dynamics, &tangent, locals, Some(scale)).ok()?;
+    let tangent = Tangent::new(dynamics, active, shooting.local(start_states));
+    let start_states = start_states.to_vec();
+    let search = Search::new(shooting, dynamics, &tangent, start_states, Some(scale)).ok()?;
     search.predicted_cost()
 }

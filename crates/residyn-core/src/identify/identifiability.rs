@@ -29,7 +29,7 @@ pub struct Open {
 }
 
 impl Identifiability {
-    /// Take over a combination that was found open later.
+    /// Add a combination that was found undetermined later.
     pub fn leave(&mut self, open: Open) {
         if self.hold.contains(&open.hold) {
             return;
@@ -43,16 +43,16 @@ impl Identifiability {
 /// A combination is undetermined if its standard deviation, relative to the parameters' magnitudes, is larger than this:
 /// its 95 % interval then extends to seven times its value.
 const LOOSE: f64 = 3.0;
-/// It is also undetermined if its information is smaller than this share of what its parameters have, each of them alone:
-/// then it is rounding.
+/// It is also undetermined if its information is smaller than this share of the information that its parameters have
+/// individually: then it is rounding error.
 const ROUNDING: f64 = 1e-11;
 /// Holding a parameter with a smaller share of the undetermined directions would determine none of them.
 const NEGLIGIBLE: f64 = 1e-3;
 /// Parameters with a smaller weight in a combination are not reported.
 const NAMED: f64 = 0.1;
 
-/// The verdict on a fit's free parameters at the values found, from the eigenvalues of its information matrix in relative
-/// units. Those that `readiness` gives a number may be held, the lowest numbers first.
+/// The verdict on a fit's free parameters at the values found, from the eigenvalues of its information matrix in
+/// relative units. Parameters for which `readiness` gives a number may be held, the lowest numbers first.
 pub fn identifiability(
     dynamics: &Dynamics,
     readiness: impl Fn(usize) -> Option<usize>,
@@ -82,9 +82,8 @@ fn named(dynamics: &Dynamics, fit: &Fit, direction: &[f64]) -> Vec<(String, f64)
     large.map(|(i, weight)| (name(i), *weight)).collect()
 }
 
-/// The combination of a fit's free parameters that varies most with the stretch of the logs that is left out, where that is too
-/// much to call it determined; of its parameters one with the lowest `readiness` is to be held, among
-/// these the one with the largest weight.
+/// The combination of a fit's free parameters that varies most with the left-out block of the logs, if it varies too
+/// much to be determined. Of its parameters with the lowest `readiness`, the one with the largest weight is to be held.
 pub fn open(
     dynamics: &Dynamics,
     readiness: impl Fn(usize) -> Option<usize>,
@@ -120,8 +119,8 @@ pub fn open(
     })
 }
 
-/// Hold the parameter with the largest weight in the undetermined directions, one after the other, while that leaves fewer
-/// of them; and how many are left.
+/// Hold the parameters with the largest weight in the undetermined directions, one after the other, while that leaves
+/// fewer directions; also returns how many are left.
 fn hold(
     information: &DMatrix<f64>,
     fit: &Fit,
@@ -137,7 +136,7 @@ fn hold(
         let mut candidates: Vec<usize> = (0..left.len())
             .filter(|i| readiness(i).is_some() && share(i) > NEGLIGIBLE)
             .collect();
-        // Of equal shares the later parameter is held: files name the leading ones first.
+        // If shares are equal, the later parameter is held: files name the leading ones first.
         candidates.sort_by(|a, b| share(b).total_cmp(&share(a)).then(b.cmp(a)));
         candidates.sort_by_key(readiness);
         let without = |i: usize| {
@@ -153,7 +152,7 @@ fn hold(
     }
 }
 
-/// Of the i-th free value, in the parameter's unit.
+/// Magnitude of the i-th free value, in the parameter's unit.
 fn magnitude(dynamics: &Dynamics, found: &Values, fit: &Fit, i: usize) -> f64 {
     let scale = dynamics.parameters[fit.columns[i].parameter].scale;
     found.get(fit.columns[i]).abs().max(1e-3 * scale)
@@ -171,11 +170,11 @@ fn relative_information(dynamics: &Dynamics, found: &Values, fit: &Fit) -> DMatr
 fn loose_directions(information: &DMatrix<f64>) -> Vec<Vec<f64>> {
     let size = information.nrows();
     let Some(eigen) = eigen(information.clone()) else {
-        // What is not finite tells nothing.
+        // Information that is not finite determines nothing.
         let axis = |i: usize| (0..size).map(|k| f64::from(u8::from(k == i))).collect();
         return (0..size).map(axis).collect();
     };
-    // The information of each parameter is rounded by itself.
+    // The information of each parameter is rounded separately.
     let rounding = |direction: &[f64]| {
         let parts = direction.iter().enumerate();
         let sizes = parts.map(|(i, w)| w.abs() * information[(i, i)].max(0.0).sqrt());

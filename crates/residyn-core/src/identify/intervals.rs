@@ -14,7 +14,7 @@ pub struct Uncertainty {
     pub covariance: DMatrix<f64>,
     /// Number of blocks of windows, which are taken as independent.
     pub blocks: usize,
-    /// Number of blocks that depend on each column: for a value of one log, the blocks of that log.
+    /// Number of blocks that depend on each column: for a per-log value, the blocks of that log.
     blocks_of: Vec<usize>,
 }
 
@@ -24,18 +24,18 @@ pub const BLOCK_S: f64 = 2.0;
 const ENOUGH_BLOCKS: f64 = 12.0;
 const SHORTEST_BLOCK_S: f64 = 0.5;
 
-/// The block of each window: stretches of a log of about [`BLOCK_S`].
+/// The block of each window: blocks of a log of about [`BLOCK_S`].
 pub fn blocks(shooting: &Shooting<'_>) -> Vec<usize> {
     let windows = &shooting.windows;
     let total_s: f64 = windows.iter().map(|w| w.duration_s(shooting.logs)).sum();
     let length_s = (total_s / ENOUGH_BLOCKS).clamp(SHORTEST_BLOCK_S, BLOCK_S);
     let starts = windows.iter().map(|w| (w.log, w.start_s(shooting.logs)));
-    stretches(starts, length_s)
+    blocks_of_times(starts, length_s)
 }
 
-/// The stretch of about `length_s` (s) in which each window begins; windows are given as log and start in s.
-pub fn stretches(windows: impl Iterator<Item = (usize, f64)>, length_s: f64) -> Vec<usize> {
-    let mut stretches = Vec::new();
+/// The block of about `length_s` (s) in which each window begins; windows are given as log and start in s.
+pub fn blocks_of_times(windows: impl Iterator<Item = (usize, f64)>, length_s: f64) -> Vec<usize> {
+    let mut blocks = Vec::new();
     let mut current: Option<(usize, f64)> = None;
     let mut count = 0;
     for (log, start) in windows {
@@ -43,20 +43,20 @@ pub fn stretches(windows: impl Iterator<Item = (usize, f64)>, length_s: f64) -> 
             current = Some((log, start));
             count += 1;
         }
-        stretches.push(count - 1);
+        blocks.push(count - 1);
     }
-    stretches
+    blocks
 }
 
-/// Covariance of the free values by the jackknife over blocks. It holds when residuals are correlated within a block, as
-/// they are wherever a model lacks something, and when a few blocks carry most of the information, where the plain
+/// Covariance of the free values by the jackknife over blocks. It holds when residuals are correlated within a block,
+/// as they are whenever a model lacks something, and when a few blocks carry most of the information, where the plain
 /// sandwich estimator is too small (Bell and McCaffrey 2002). The fits without a block are approximated: each window's
 /// loss is taken as quadratic around the joint optimum.
 pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     let blocks = blocks(shooting);
     let size = fit.columns.len();
     let blocks_of = blocks_of(shooting, fit, &blocks);
-    // Bodies are declared within a spread, which adds to the variance what it takes from it elsewhere.
+    // Bodies are declared within a spread, whose variance is added below.
     let all = fit.equations().hessian + &fit.bodies.hessian;
     let mut parts = fit.equations_by(&blocks);
     let count = parts.len();
@@ -83,7 +83,7 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         let off = step - &mean;
         spread += &off * off.transpose() * (1.0 - share);
     }
-    // The jackknife gives such a value no variance: the inverse of its information does.
+    // The jackknife gives such a value no variance, so take the inverse of its information.
     for i in alone {
         spread[(i, i)] += model[(i, i)];
     }
@@ -98,14 +98,14 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
 }
 
 /// By how much the variance of bodies about the declared ones exceeds what a fit takes it to be: twice the cost of the
-/// departures that the logs tell over their number (empirical Bayes; MacKay, Bayesian interpolation, 1992), at least 1. What
-/// logs do not tell stays at the declared values and says nothing of how good those are.
+/// departures that the logs determine, over their number (empirical Bayes; MacKay, Bayesian interpolation, 1992), at
+/// least 1. Values that the logs do not determine stay at the declared ones and do not show how good those are.
 fn excess(fit: &Fit, covariance: &DMatrix<f64>) -> f64 {
     let bodies = &fit.bodies.hessian;
     let of_bodies = (0..bodies.nrows()).filter(|i| bodies[(*i, *i)] > 0.0);
     #[allow(clippy::cast_precision_loss)] // some tens
-    let told = of_bodies.count() as f64 - (covariance * bodies).trace();
-    (2.0 * fit.bodies.cost / told.max(1.0)).max(1.0)
+    let message = of_bodies.count() as f64 - (covariance * bodies).trace();
+    (2.0 * fit.bodies.cost / message.max(1.0)).max(1.0)
 }
 
 fn blocks_of(shooting: &Shooting<'_>, fit: &Fit, blocks: &[usize]) -> Vec<usize> {
@@ -121,16 +121,16 @@ fn blocks_of(shooting: &Shooting<'_>, fit: &Fit, blocks: &[usize]) -> Vec<usize>
     fit.columns.iter().map(|column| count(column.log)).collect()
 }
 
-/// Directions with less than this share of the largest eigenvalue are flat: their information is rounding.
+/// Directions with less than this share of the largest eigenvalue are flat: their information is rounding error.
 const FLAT: f64 = 1e-9;
 
 /// The inverse of an information matrix, and its part along flat directions. The jackknife, a product of two roundings
 /// there, would understate the variance along them.
 fn inverse(hessian: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
-    // "Flat" does not depend on units where the diagonal is one.
+    // With a unit diagonal, "flat" does not depend on units.
     let (scaled, scale) = with_unit_diagonal(hessian);
     let Some(eigen) = eigen(scaled) else {
-        // Nothing is known where the equations are not finite.
+        // Nothing is known if the equations are not finite.
         let unknown = DMatrix::from_diagonal_element(scale.len(), scale.len(), f64::INFINITY);
         return (unknown.clone(), unknown);
     };
@@ -155,13 +155,13 @@ fn inverse(hessian: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
 }
 
 impl Uncertainty {
-    /// Half width of the 95 % interval of the i-th column: Student's t with one degree of freedom less than blocks that
-    /// depend on it.
+    /// Half width of the 95 % interval of the i-th column: Student's t with one degree of freedom fewer than the blocks
+    /// that depend on it.
     pub fn half_width(&self, i: usize) -> f64 {
         self.half_width_of(&[(i, 1.0)])
     }
 
-    /// The same of a sum of columns with these weights.
+    /// The same for a sum of columns with these weights.
     pub fn half_width_of(&self, sum: &[(usize, f64)]) -> f64 {
         let part = |(i, weight): &(usize, f64)| -> f64 {
             sum.iter()
@@ -173,7 +173,7 @@ impl Uncertainty {
         quantiles.fold(0.0, f64::max) * variance.max(0.0).sqrt()
     }
 
-    /// Correlation of the i-th and the j-th column; 0 between two where one is not determined.
+    /// Correlation of the i-th and the j-th column; 0 if one of them is not determined.
     pub fn correlation(&self, i: usize, j: usize) -> f64 {
         let variances = self.covariance[(i, i)] * self.covariance[(j, j)];
         match self.covariance[(i, j)] / variances.sqrt() {
@@ -187,7 +187,7 @@ impl Uncertainty {
     pub fn p_value(&self, i: usize, value: f64, null: f64) -> f64 {
         let deviation = self.covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();
         let distance = ((value - null) / deviation).abs();
-        // A value that is no number says nothing.
+        // A value that is NaN says nothing.
         if distance.is_nan() {
             return 1.0;
         }

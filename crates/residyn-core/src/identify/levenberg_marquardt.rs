@@ -8,35 +8,35 @@ use super::values::{Layout, Values};
 use crate::data::statistics::{SIGMA_PER_MAD, upper_median};
 use crate::model::Dynamics;
 
-/// A fit that estimates ends when a step lowers the cost by less than this share.
+/// A fit for estimation ends when a step lowers the cost by less than this share.
 const ENOUGH: f64 = 1e-6;
 /// A fit at a given scale is for comparing models, which differ by more than this share of the cost or not at all.
 const ENOUGH_TO_COMPARE: f64 = 1e-4;
-/// One that is of use only below some cost is for choosing among sets of effects, which differ by more than this.
+/// A fit that is of use only below some cost is for choosing among sets of effects, which differ by more than this.
 const ENOUGH_TO_CHOOSE: f64 = 1e-3;
 /// Damping of the first step, as a share of the diagonal of the normal equations, and the factors by which it changes
 /// with each step that lowers the cost and with each that does not.
 const FIRST_DAMPING: f64 = 1e-3;
 const DAMPING_ON_SUCCESS: f64 = 0.1;
 const DAMPING_ON_FAILURE: f64 = 10.0;
-/// A scale has settled that changes by less than this share.
+/// A scale that changes by less than this share has settled.
 const SETTLED: f64 = 0.01;
-/// A fit that is of use only below some cost is given up where that cost is farther than so many times the decrease that
-/// the quadratic model predicts,
+/// A fit that is of use only below some cost is given up if that cost is farther away than this many times the decrease
+/// that the quadratic model predicts,
 const OUT_OF_REACH: f64 = 3.0;
-/// after so many steps: the first ones say little about where a search will end.
+/// after this many steps: the first ones say little about where a search will end.
 const FIRST_STEPS: usize = 3;
-/// Less damping than this is none, and with more the step is shorter than rounding.
+/// Below this range damping has no effect, and above it the step is shorter than rounding error.
 const DAMPING_RANGE: [f64; 2] = [1e-12, 1e12];
 
-/// A Levenberg-Marquardt search (Marquardt 1963) for the values of a model and the windows' own.
+/// A Levenberg-Marquardt search (Marquardt 1963) for the values of a model and the windows' own values.
 pub(super) struct Search<'a> {
     shooting: &'a Shooting<'a>,
     dynamics: &'a Dynamics,
     tangent: &'a Tangent,
     layout: Layout,
     values: Values,
-    locals: Vec<Vec<f64>>,
+    start_states: Vec<Vec<f64>>,
     scale: f64,
     cost: f64,
     /// The share of the cost by which a step must lower it for another one to follow.
@@ -51,7 +51,7 @@ pub(super) struct Search<'a> {
 /// A step of all values at once.
 struct Step {
     values: Values,
-    locals: Vec<Vec<f64>>,
+    start_states: Vec<Vec<f64>>,
 }
 
 impl<'a> Search<'a> {
@@ -63,7 +63,7 @@ impl<'a> Search<'a> {
         shooting: &'a Shooting<'a>,
         dynamics: &'a Dynamics,
         tangent: &'a Tangent,
-        locals: Vec<Vec<f64>>,
+        start_states: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Self, FitError> {
         if shooting.windows.is_empty() {
@@ -75,7 +75,7 @@ impl<'a> Search<'a> {
             tangent,
             layout: Layout::new(&dynamics.parameters, &tangent.active, &shooting.windows),
             values: Values::of(dynamics, shooting.logs),
-            locals,
+            start_states,
             scale: scale.unwrap_or(1.0),
             cost: f64::INFINITY,
             enough: scale.map_or(ENOUGH, |_| ENOUGH_TO_COMPARE),
@@ -84,7 +84,7 @@ impl<'a> Search<'a> {
             steps: 0,
             trace: Vec::new(),
         };
-        let costs = shooting.costs(dynamics, &search.values, &search.locals, search.scale);
+        let costs = shooting.costs(dynamics, &search.values, &search.start_states, search.scale);
         let diverged = costs.iter().filter(|cost| !cost.is_finite()).count();
         if diverged > 0 {
             return Err(FitError::Diverged {
@@ -95,46 +95,46 @@ impl<'a> Search<'a> {
         if scale.is_none() {
             search.rescale();
         } else {
-            search.cost = costs.iter().sum::<f64>() + search.departure();
+            search.cost = costs.iter().sum::<f64>() + search.prior_cost();
         }
         Ok(search)
     }
 
-    /// Give up where the cost will not come below this.
+    /// Give up if the cost will not fall below this.
     pub fn only_below(mut self, cost: f64) -> Self {
         self.below = cost;
         self.enough = ENOUGH_TO_CHOOSE;
         self
     }
 
-    /// Estimate the scale from the residuals at hand; says whether it hardly changes.
+    /// Estimate the scale from the current residuals; returns whether it hardly changes.
     pub fn rescale(&mut self) -> bool {
         let before = self.scale;
         let residuals = self
             .shooting
-            .residuals(self.dynamics, &self.values, &self.locals);
+            .residuals(self.dynamics, &self.values, &self.start_states);
         self.scale = robust_scale(residuals.into_iter().flatten());
-        self.cost = self.total(&self.values, &self.locals);
+        self.cost = self.total(&self.values, &self.start_states);
         self.damping = FIRST_DAMPING;
         (self.scale / before - 1.0).abs() < SETTLED
     }
 
-    fn total(&self, values: &Values, locals: &[Vec<f64>]) -> f64 {
+    fn total(&self, values: &Values, start_states: &[Vec<f64>]) -> f64 {
         let costs = self
             .shooting
-            .costs(self.dynamics, values, locals, self.scale);
-        costs.iter().sum::<f64>() + self.shooting.departure(&self.layout.columns, values)
+            .costs(self.dynamics, values, start_states, self.scale);
+        costs.iter().sum::<f64>() + self.shooting.prior_cost(&self.layout.columns, values)
     }
 
-    /// The part of the cost that its values owe to their distance from the declared ones.
-    fn departure(&self) -> f64 {
-        self.shooting.departure(&self.layout.columns, &self.values)
+    /// The part of the cost that is due to the values' distance from the declared ones.
+    fn prior_cost(&self) -> f64 {
+        self.shooting.prior_cost(&self.layout.columns, &self.values)
     }
 
     /// What it adds to the normal equations.
-    fn departure_terms(&self) -> WindowTerms {
+    fn prior_terms(&self) -> WindowTerms {
         self.shooting
-            .departure_terms(&self.layout.columns, &self.values)
+            .prior_terms(&self.layout.columns, &self.values)
     }
 
     /// Take steps until none is worth taking, or until there have been `most`.
@@ -149,7 +149,7 @@ impl<'a> Search<'a> {
         Termination::StepLimit
     }
 
-    /// Take one step that lowers the cost; says why no other one is to follow.
+    /// Take one step that lowers the cost; returns why no other step is to follow, if so.
     fn step(&mut self) -> Option<Termination> {
         self.steps += 1;
         let terms = self.linearised();
@@ -158,12 +158,16 @@ impl<'a> Search<'a> {
         }
         let mut is_solvable = false;
         while self.damping < DAMPING_RANGE[1] {
-            if let Some(Step { values, locals }) = self.propose(&terms) {
+            if let Some(Step {
+                values,
+                start_states,
+            }) = self.propose(&terms)
+            {
                 is_solvable = true;
-                let cost = self.total(&values, &locals);
+                let cost = self.total(&values, &start_states);
                 if cost < self.cost {
                     let gain = (self.cost - cost) / self.cost.max(f64::MIN_POSITIVE);
-                    (self.values, self.locals, self.cost) = (values, locals, cost);
+                    (self.values, self.start_states, self.cost) = (values, start_states, cost);
                     self.damping = (self.damping * DAMPING_ON_SUCCESS).max(DAMPING_RANGE[0]);
                     return (gain <= self.enough).then_some(Termination::SmallDecrease);
                 }
@@ -180,16 +184,16 @@ impl<'a> Search<'a> {
     }
 
     /// Whether the quadratic model of the cost predicts a decrease that would be worth another step. A loss below 1 is
-    /// that of a single residual, so that a share of it is no more than rounding.
+    /// that of a single residual, so a share of it is no more than rounding error.
     fn predicts_enough(&mut self, terms: &[WindowTerms]) -> bool {
         self.damping = FIRST_DAMPING;
         let predicted = self.predicted_decrease(terms);
         predicted.is_none_or(|decrease| decrease > self.enough * self.cost.max(1.0))
     }
 
-    /// Whether the quadratic model of the cost, hardly damped, does not lead anywhere near a cost of use.
+    /// Whether the quadratic model of the cost, hardly damped, leads nowhere near a useful cost.
     fn is_out_of_reach(&mut self, terms: &[WindowTerms]) -> bool {
-        let below = self.below + self.departure();
+        let below = self.below + self.prior_cost();
         if self.cost <= below {
             return false;
         }
@@ -200,14 +204,14 @@ impl<'a> Search<'a> {
         predicted.is_some_and(|decrease| self.cost - OUT_OF_REACH * decrease > below)
     }
 
-    /// Predicted decrease of the cost by the next step; `None` where there is none.
+    /// Predicted decrease of the cost by the next step; `None` if there is no such step.
     fn predicted_decrease(&self, terms: &[WindowTerms]) -> Option<f64> {
         let normal = self.normal(terms);
         let step = self.bounded_solution(&normal)?;
         Some(normal.predicted_decrease(&step)).filter(|decrease| decrease.is_finite())
     }
 
-    /// The cost that the next step is predicted to reach; `None` where there is none.
+    /// The cost that the next step is predicted to reach; `None` if there is no such step.
     pub fn predicted_cost(&self) -> Option<f64> {
         let decrease = self.predicted_decrease(&self.linearised())?;
         Some(self.cost - decrease)
@@ -218,7 +222,7 @@ impl<'a> Search<'a> {
             self.dynamics,
             self.tangent,
             &self.values,
-            &self.locals,
+            &self.start_states,
             self.scale,
         )
     }
@@ -227,7 +231,7 @@ impl<'a> Search<'a> {
         let (shared, layout) = (self.tangent.active.len(), &self.layout);
         let windows = &self.shooting.windows;
         let mut normal = Normal::new(terms, windows, layout, shared, self.damping);
-        let declared = self.departure_terms();
+        let declared = self.prior_terms();
         normal.gradient += declared.gradient;
         normal.matrix += declared.hessian;
         normal
@@ -243,17 +247,19 @@ impl<'a> Search<'a> {
             .map(|&column| values.get(column) - self.values.get(column));
         let taken = DVector::from_iterator(step.len(), taken);
         let windows = normal.windows.iter().zip(&self.shooting.windows);
-        let locals = windows.zip(&self.locals).map(|((part, window), local)| {
-            let step = part.local_step(&taken.select_rows(self.layout.places(window)));
-            step.iter().zip(local).map(|(d, x)| x + d).collect()
-        });
+        let start_states = windows
+            .zip(&self.start_states)
+            .map(|((part, window), local)| {
+                let step = part.local_step(&taken.select_rows(self.layout.places(window)));
+                step.iter().zip(local).map(|(d, x)| x + d).collect()
+            });
         Some(Step {
-            locals: locals.collect(),
+            start_states: start_states.collect(),
             values,
         })
     }
 
-    /// The damped step, with parameters that a bound would stop taken out one after the other.
+    /// The damped step, with parameters that a bound would stop removed one after the other.
     fn bounded_solution(&self, normal: &Normal) -> Option<DVector<f64>> {
         let matrix = self.damped(&normal.matrix);
         let right = -&normal.gradient;
@@ -283,21 +289,21 @@ impl<'a> Search<'a> {
         matrix
     }
 
-    /// What has been found.
+    /// The result of the search.
     pub fn finish(self, termination: Termination) -> (Values, Fit) {
         let terms = self.linearised();
         let windows = terms.iter().zip(&self.shooting.windows);
         let reduced = windows
             .map(|(terms, window)| Reduced::of(terms, self.layout.places(window)))
             .collect();
-        let prior = self.departure_terms();
+        let prior = self.prior_terms();
         let bodies = (self.shooting).declared_bodies(&self.layout.columns, &self.values);
         let fit = Fit {
             active: self.tangent.active.clone(),
-            cost: self.cost - self.departure(),
-            departure: self.departure(),
+            cost: self.cost - self.prior_cost(),
+            prior_cost: self.prior_cost(),
             columns: self.layout.columns,
-            locals: self.locals,
+            start_states: self.start_states,
             scale: self.scale,
             prior,
             bodies,
@@ -326,14 +332,14 @@ mod tests {
     use crate::identify::{FitError, Shooting, cut};
     use crate::model::{Dynamics, Model};
 
-    /// One joint that follows `formula`, where `k` starts at `value`.
+    /// One joint that follows `formula`, in which `k` starts at `value`.
     fn joint(formula: &str, value: f64) -> Dynamics {
         let text = format!(
             "[system]\nname = \"joint\"\njoints = 1\n[parameters]\nk = {{ value = {value} }}\n\
              [dynamics]\nqdd1 = \"{formula}\"\n"
         );
         let model = Model::from_text(Path::new("joint.toml"), &text, &[]).unwrap();
-        model.with_sign_widths(vec![0.0]).dynamics()
+        model.with_smoothing_velocities(vec![0.0]).dynamics()
     }
 
     /// 4 s at 100 Hz of an acceleration of 2.
@@ -347,13 +353,13 @@ mod tests {
         log
     }
 
-    /// How a fit of `k` ends that may take so many steps, and the value that it finds.
+    /// How a fit of `k` with at most `most` steps ends, and the value that it finds.
     fn end(formula: &str, value: f64, most: usize) -> Result<(Termination, f64), FitError> {
         let (logs, dynamics) = ([log()], joint(formula, value));
         let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
         let tangent = Tangent::new(&dynamics, &[0], Local::State);
-        let locals = shooting.initial_locals(0);
-        let mut search = Search::new(&shooting, &dynamics, &tangent, locals, Some(1.0))?;
+        let start_states = shooting.initial_start_states(0);
+        let mut search = Search::new(&shooting, &dynamics, &tangent, start_states, Some(1.0))?;
         let termination = search.run(most);
         let (found, fit) = search.finish(termination);
         assert_eq!(fit.termination, termination);

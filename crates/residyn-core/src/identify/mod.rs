@@ -1,9 +1,9 @@
 //! Physical parameters from logs: least squares in f64, on trajectories or on torques.
 //!
-//! On trajectories measured data are never differentiated: windows of a log are integrated open loop from free start states
-//! and compared with the logged positions. On torques, for rigs that are moved as they are told, the smoothed motion is, and
-//! the torque that it needs is compared with the logged one. Logged velocities are not used, since most rigs filter or delay
-//! them.
+//! On trajectories, measured data are never differentiated: windows of a log are integrated open loop from free start
+//! states and compared with the logged positions. On torques, for position-controlled rigs, the smoothed motion is
+//! differentiated, and the torque that it needs is compared with the logged one. Logged velocities are not used, since
+//! most rigs filter or delay them.
 
 mod balance;
 mod combinations;
@@ -26,11 +26,11 @@ mod torques;
 mod values;
 
 pub use crate::sim::{Window, cut, initial_state};
-pub use combinations::{BodiesTold, Combination, bodies_told};
+pub use combinations::{Combination, IdentifiableBodies, identifiable_bodies};
 pub use distance::squared_distance;
 pub use fit::{as_it_stands, fit, fit_below, predicted_cost};
 pub use identifiability::{Identifiability, Open, identifiability, open};
-pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};
+pub use intervals::{BLOCK_S, Uncertainty, blocks, blocks_of_times, uncertainty};
 pub use normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
 pub use offsets::{CalibrateError, Offsets, calibrate, calibrate_first};
 pub use outcome::{Fit, FitError, Termination};

@@ -68,7 +68,8 @@ pub(super) struct Normal {
 }
 
 impl Normal {
-    /// `shared` free values enter each window; its own ones are damped by `damping`, a share of the diagonal.
+    /// `shared` free values enter each window; the window's own values are damped by `damping`, a share of the
+    /// diagonal.
     pub fn new(
         terms: &[WindowTerms],
         windows: &[Window],
@@ -105,25 +106,25 @@ pub(super) struct Eliminated {
     /// Step of the own values = -(own^-1 gradient) - (own^-1 cross) step of the shared ones.
     local_gradient: DVector<f64>,
     local_cross: DMatrix<f64>,
-    /// Predicted decrease of the cost where the own values alone take a step.
+    /// Predicted decrease of the cost if only the own values take a step.
     own_decrease: f64,
 }
 
 impl Eliminated {
     fn new(terms: &WindowTerms, shared: usize, damping: f64) -> Self {
-        let locals = terms.gradient.len() - shared;
+        let start_states = terms.gradient.len() - shared;
         let part = |first: (usize, usize), size: (usize, usize)| {
             terms.hessian.view(first, size).into_owned()
         };
-        let mut own = part((shared, shared), (locals, locals));
-        for i in 0..locals {
+        let mut own = part((shared, shared), (start_states, start_states));
+        for i in 0..start_states {
             own[(i, i)] += damping * own[(i, i)] + 1e-12;
         }
-        let cross = part((shared, 0), (locals, shared));
-        let own_gradient = terms.gradient.rows(shared, locals).into_owned();
+        let cross = part((shared, 0), (start_states, shared));
+        let own_gradient = terms.gradient.rows(shared, start_states).into_owned();
         let inverse = own.clone().cholesky().map_or_else(
             // Not positive definite: the window does not determine its own values, which then stay.
-            || DMatrix::zeros(locals, locals),
+            || DMatrix::zeros(start_states, start_states),
             |cholesky| cholesky.inverse(),
         );
         let local_gradient = &inverse * &own_gradient;
@@ -146,7 +147,7 @@ impl Eliminated {
     }
 }
 
-/// The solution with the held unknowns at zero; `None` where the matrix of the others is not positive definite or not
+/// The solution with the held unknowns at zero; `None` if the matrix of the others is not positive definite or not
 /// finite.
 pub(super) fn solve_with_held(
     matrix: &DMatrix<f64>,

@@ -3,13 +3,13 @@ use thiserror::Error;
 use super::{FitError, Shooting, fit};
 use crate::data::{Interval, Joint, Log};
 use crate::expr::Graph;
-use crate::model::{Dynamics, OwnValue, Parameter};
+use crate::model::{Dynamics, Parameter, PerLogValue};
 use crate::sim::cut;
 
 /// A model with an unknown sensor offset per joint and log.
 #[derive(Debug, Clone)]
 pub struct Offsets {
-    /// Each log's offsets are values of its own.
+    /// Each log's offsets are per-log values.
     pub dynamics: Dynamics,
     /// The sensor offsets in rad (or m), `[log][joint]`.
     pub offsets: Vec<Vec<f64>>,
@@ -36,7 +36,7 @@ const WINDOW_S: f64 = 0.5;
 /// Estimate the sensor offsets of each log on its first `fraction`, which is then left out of the log.
 ///
 /// # Errors
-/// A fraction outside of 0 to 1, or a beginning that is too short.
+/// A fraction outside 0 to 1, or a beginning that is too short.
 pub fn calibrate(
     dynamics: &Dynamics,
     logs: &mut [Log],
@@ -85,7 +85,7 @@ fn calibrate_on(
                 seconds,
                 source,
             })?;
-        let own = |(parameter, &value): (usize, &f64)| OwnValue {
+        let own = |(parameter, &value): (usize, &f64)| PerLogValue {
             log: log.path.display().to_string(),
             parameter,
             value,
@@ -107,12 +107,12 @@ fn estimate(dynamics: &Dynamics, first: usize, log: Log) -> Result<Vec<f64>, Fit
     let noise = vec![1e-3; dynamics.joints];
     let shooting = Shooting::new(&logs, cut(&logs, WINDOW_S), &noise);
     let active: Vec<usize> = (first..dynamics.parameters.len()).collect();
-    let locals = shooting.initial_locals(0);
-    let (found, _) = fit(&shooting, dynamics, &active, locals, None)?;
+    let start_states = shooting.initial_start_states(0);
+    let (found, _) = fit(&shooting, dynamics, &active, start_states, None)?;
     Ok(found.common[first..].to_vec())
 }
 
-/// The same equations in logged angles: the true angle is the logged one less the offset.
+/// The same equations in logged angles: the true angle is the logged one minus the offset.
 fn with_offsets(dynamics: &Dynamics) -> Dynamics {
     let n = dynamics.joints;
     let mut graph = Graph::new();

@@ -11,7 +11,7 @@ use crate::decomposition::eigen;
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum FitError {
     #[error(
-        "the logs give no window to fit: every stretch is shorter than a window, broken by a gap or left out; record longer logs or leave out less"
+        "the logs give no window to fit: every block is shorter than a window, broken by a gap or left out; record longer logs or leave out less"
     )]
     NoWindow,
     #[error(
@@ -20,32 +20,32 @@ pub enum FitError {
     Diverged { diverged: usize, windows: usize },
 }
 
-/// The result of a fit beside the values found: its cost, how it ended, and the normal equations there.
+/// The result of a fit apart from the values found: its cost, how it ended, and the normal equations there.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// Which parameters were free.
     pub active: Vec<usize>,
-    /// The free values: one column for each free parameter, or one for each log where it differs by log.
+    /// The free values: one column for each free parameter or, if it differs by log, one for each log.
     pub columns: Vec<Column>,
     /// Each window's own values: its start state, then forces if they were free.
-    pub locals: Vec<Vec<f64>>,
-    /// Robust standard deviation of the normalised residuals: 1 where the model explains all but noise.
+    pub start_states: Vec<Vec<f64>>,
+    /// Robust standard deviation of the normalised residuals: 1 if the model explains everything except noise.
     pub scale: f64,
     /// Sum of the losses at that scale.
     pub cost: f64,
-    /// What the departure from the declared values costs beside it.
-    pub departure: f64,
-    /// What the declared values add to the normal equations; no cost.
+    /// The additional cost of the values' departure from the declared ones.
+    pub prior_cost: f64,
+    /// What the declared values add to the normal equations, without a cost.
     pub(super) prior: WindowTerms,
-    /// The part of them that is of bodies, which are known to be near those declared: like data. With its cost.
+    /// The bodies' part of them, with its cost: bodies are known to be near the declared ones, which counts like data.
     pub(super) bodies: WindowTerms,
     /// The normal equations of each window in the free values, its own values eliminated.
     pub reduced: Vec<Reduced>,
-    /// Steps that were taken.
+    /// Number of steps taken.
     pub steps: usize,
-    /// The cost after each, in units of the sensors' noise: times the square of the scale that it had then.
+    /// The cost after each, in units of the sensors' noise: times the square of the scale at that step.
     pub trace: Vec<f64>,
-    /// Why there were no more.
+    /// Why the fit ended.
     pub termination: Termination,
 }
 
@@ -64,7 +64,7 @@ impl Fit {
         all
     }
 
-    /// The same with what the declared values tell: those whose gradient is zero where the fit ended.
+    /// The same with the prior of the declared values: the equations whose gradient is zero where the fit ended.
     pub fn equations_and_prior(&self) -> WindowTerms {
         let mut all = self.equations();
         all.gradient += &self.prior.gradient;
@@ -73,7 +73,7 @@ impl Fit {
     }
 
     /// Largest over smallest eigenvalue of the normal equations' matrix in the free values, as they are and in units in
-    /// which each of them alone has the same information; infinite where the matrix is singular, 1 without free values.
+    /// which each value alone has the same information; infinite if the matrix is singular, 1 without free values.
     pub fn condition(&self) -> [f64; 2] {
         let matrix = self.equations().hessian;
         let (scaled, _) = with_unit_diagonal(&matrix);
@@ -110,9 +110,9 @@ impl Fit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Termination {
-    /// Converged: the last step lowered the cost by less than the share that matters.
+    /// Converged: the last step lowered the cost by less than the relevant share.
     SmallDecrease,
-    /// Converged: no step lowers the cost, and its quadratic model predicts that none would by a share that matters.
+    /// Converged: no step lowers the cost, and its quadratic model predicts no decrease by a relevant share.
     SmallPredictedDecrease,
     /// Not converged: no step lowers the cost, although its quadratic model predicts a decrease.
     NoDescent,
@@ -120,9 +120,9 @@ pub enum Termination {
     Singular,
     /// Not converged: the cost was still falling after the largest number of steps.
     StepLimit,
-    /// Not converged: the cost was not coming down to where the fit would have been of use.
+    /// Not converged: the cost was not falling far enough for the fit to be of use.
     GivenUp,
-    /// No value was free to change but the windows' own, or none at all: the model was evaluated as it was given.
+    /// No value was free except the windows' own, or none at all: the model was evaluated as given.
     AsGiven,
 }
 

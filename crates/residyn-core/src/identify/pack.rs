@@ -25,9 +25,9 @@ pub(super) struct Pack {
     /// `[row][joint]`
     tau: Vec<Vec<Lane>>,
     pub q: Vec<Vec<Lane>>,
-    /// `[row][joint]`: 1 / noise, or 0 where the lane has no such row or its log masks it.
+    /// `[row][joint]`: 1 / noise, or 0 if the lane has no such row or its log masks it.
     pub weight: Vec<Vec<Lane>>,
-    /// `[angles, velocities]`: what the logs tell of the start states, and 1 / standard deviation.
+    /// `[angles, velocities]`: the logs' estimates of the start states, and 1 / standard deviation.
     start: Vec<Lane>,
     start_weight: Vec<Lane>,
 }
@@ -95,7 +95,7 @@ impl Pack {
         pack
     }
 
-    /// Forget what the logs tell of the start states.
+    /// Drop the logs' estimates of the start states.
     pub fn free_starts(&mut self) {
         self.start_weight.fill(Row::splat(0.0));
     }
@@ -110,15 +110,15 @@ impl Pack {
     }
 
     /// The local values of the pack's windows, one row per value.
-    fn gather(&self, locals: &[Vec<f64>]) -> Vec<Lane> {
-        let lane_of = |lane: usize| &locals[self.windows[lane.min(self.windows.len() - 1)]];
+    fn gather(&self, start_states: &[Vec<f64>]) -> Vec<Lane> {
+        let lane_of = |lane: usize| &start_states[self.windows[lane.min(self.windows.len() - 1)]];
         (0..lane_of(0).len())
             .map(|k| Row(std::array::from_fn(|lane| lane_of(lane)[k])))
             .collect()
     }
 
     /// Call `set(parameter, lane, value)` for every value that belongs to the log of a single lane.
-    fn own_values(&self, values: &Values, mut set: impl FnMut(usize, usize, f64)) {
+    fn per_log_values(&self, values: &Values, mut set: impl FnMut(usize, usize, f64)) {
         for own in &values.own {
             for lane in (0..LANES).filter(|&lane| self.logs[lane] == own.log) {
                 set(own.parameter, lane, own.value);
@@ -126,7 +126,7 @@ impl Pack {
         }
     }
 
-    /// The hold from `row` to the next. `force` holds the windows' own forces, if they have any.
+    /// The hold from `row` to the next. `force` holds the windows' forces, if they have any.
     fn hold<'a>(
         &'a self,
         commands: &'a [Commands<'a>],
@@ -155,15 +155,15 @@ impl Pack {
         dynamics: &Dynamics,
         values: &Values,
         commands: &[Commands<'_>],
-        locals: &[Vec<f64>],
+        start_states: &[Vec<f64>],
         mut see: impl FnMut(usize, &[Lane]),
     ) {
-        let mut state = self.gather(locals);
+        let mut state = self.gather(start_states);
         let forces = state.split_off(dynamics.states());
         let model = Point::new(dynamics, values.common.as_slice());
         let mut simulator = Simulator::<LANES>::new(&model, RK4);
         simulator.state = state;
-        self.own_values(values, |parameter, lane, value| {
+        self.per_log_values(values, |parameter, lane, value| {
             simulator.set_in_lane(parameter, lane, value);
         });
         for row in 0..self.rows() {
@@ -174,21 +174,21 @@ impl Pack {
         }
     }
 
-    /// The Huber loss of each window at residual scale `scale`, and that of its start state; not finite where the model
+    /// The Huber loss of each window at residual scale `scale`, including its start state; not finite if the model
     /// diverges.
     pub fn costs(
         &self,
         dynamics: &Dynamics,
         values: &Values,
         commands: &[Commands<'_>],
-        locals: &[Vec<f64>],
+        start_states: &[Vec<f64>],
         scale: f64,
     ) -> Vec<(usize, f64)> {
         let n = dynamics.joints;
         let mut costs: Vec<(usize, f64)> = self.windows.iter().map(|&w| (w, 0.0)).collect();
-        self.roll(dynamics, values, commands, locals, |row, angles| {
+        self.roll(dynamics, values, commands, start_states, |row, angles| {
             for (lane, (window, cost)) in costs.iter_mut().enumerate() {
-                let velocities = &locals[*window][n..];
+                let velocities = &start_states[*window][n..];
                 for j in 0..n {
                     let weight = self.weight[row][j][lane] / scale;
                     *cost += loss((angles[j][lane] - self.q[row][j][lane]) * weight).0;
@@ -210,14 +210,14 @@ impl Pack {
         tangent: &Tangent,
         values: &Values,
         commands: &[Commands<'_>],
-        locals: &[Vec<f64>],
+        start_states: &[Vec<f64>],
         scale: f64,
     ) -> Vec<(usize, WindowTerms)> {
         let (n, columns) = (tangent.joints, tangent.columns());
-        let states = self.gather(locals);
+        let states = self.gather(start_states);
         let mut sums = Sums::new(columns);
         let mut stepper = TangentStepper::new(tangent, &values.common, RK4);
-        self.own_values(values, |parameter, lane, value| {
+        self.per_log_values(values, |parameter, lane, value| {
             stepper.set_in_lane(parameter, lane, value);
         });
         stepper.start(&states);
@@ -240,7 +240,7 @@ impl Pack {
         self.windows.iter().copied().zip(terms).collect()
     }
 
-    /// Add the distance of the start states from what the logs tell of them. It has the sensor's scale, not that of the
+    /// Add the distance of the start states from the logs' estimates. It has the sensor's scale, not that of the
     /// residuals: the worse a model is, the less it may move its start states.
     fn add_starts(
         &self,
@@ -253,8 +253,10 @@ impl Pack {
         let mut own = vec![Row::splat(0.0); columns];
         for j in 0..n {
             let mut add = |k: usize, value: &Lane, slopes: &[Lane]| {
-                let (told, weight) = (self.start[k], self.start_weight[k]);
-                let residual = Row(std::array::from_fn(|l| (value[l] - told[l]) * weight[l]));
+                let (estimate, weight) = (self.start[k], self.start_weight[k]);
+                let residual = Row(std::array::from_fn(|l| {
+                    (value[l] - estimate[l]) * weight[l]
+                }));
                 sums.add(&residual, slopes, &weight);
             };
             add(j, &angles[j], &slopes[j * columns..][..columns]);

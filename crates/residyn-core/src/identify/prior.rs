@@ -3,14 +3,14 @@ use super::normal_equations::WindowTerms;
 use super::values::{Column, Values};
 use crate::model::Model;
 
-/// What is known of a model's values beside the logs: that declared ones are of the right size. Of values with which a model
-/// explains the logs equally well, those nearest to the declared ones are found.
+/// What is known of a model's values apart from the logs: that the declared ones are of the right size. Of all values
+/// with which a model explains the logs equally well, the fit finds those nearest to the declared ones.
 ///
-/// The cost of a value is half the square of its departure, which grows as the logarithm of its ratio to the declared one where
-/// they differ much, and stays finite where the value changes its sign.
+/// The cost of a value is half the square of its departure, which grows as the logarithm of its ratio to the declared
+/// one if they differ much, and stays finite if the value changes sign.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Prior {
-    /// Declared values that are no part of a body; none is zero.
+    /// Declared values that are not part of a body; none is zero.
     declared: Vec<Declared>,
     bodies: Vec<DeclaredBody>,
 }
@@ -21,12 +21,13 @@ struct Declared {
     value: f64,
 }
 
-/// A ratio to the declared value is small below one over this: zero departs from it as far as a tenfold value does.
+/// A ratio to the declared value counts as small below one over this: zero departs as far from it as a tenfold value
+/// does.
 const STEEPNESS: f64 = 5.0;
 
 impl Declared {
-    /// About the logarithm of the ratio, 0 where it is 1; and its slope.
-    fn departure(&self, value: f64) -> (f64, f64) {
+    /// About the logarithm of the ratio, 0 at a ratio of 1; and its slope.
+    fn prior_cost(&self, value: f64) -> (f64, f64) {
         let ratio = STEEPNESS * value / self.value;
         let slope = STEEPNESS / self.value / (1.0 + ratio * ratio).sqrt();
         (ratio.asinh() - STEEPNESS.asinh(), slope)
@@ -36,7 +37,7 @@ impl Declared {
 impl Prior {
     /// Values are near those declared.
     pub fn near(model: &Model) -> Self {
-        // Effects that the file carries are declared as well, but for what each log has of its own.
+        // Effects in the file are declared as well, except for their per-log values.
         let all = model.all_parameters();
         let value = |parameter: usize| all[parameter].value;
         let body = |parts: [usize; PARTS]| DeclaredBody::new(parts, &parts.map(value));
@@ -57,7 +58,7 @@ impl Prior {
         }
     }
 
-    /// The bodies with their parts, where a fit may change one of them, and the places of the parts among its columns.
+    /// The bodies of which a fit may change a part, with their parts and the places of the parts among its columns.
     fn free_bodies<'a>(
         &'a self,
         columns: &'a [Column],
@@ -75,7 +76,7 @@ impl Prior {
     }
 
     /// The departures of free values: which of `columns`, how far, and the slope.
-    fn departures<'a>(
+    fn prior_costs<'a>(
         &'a self,
         columns: &'a [Column],
         values: &'a Values,
@@ -83,15 +84,15 @@ impl Prior {
         columns.iter().enumerate().filter_map(|(i, &column)| {
             let is_it = |declared: &&Declared| declared.parameter == column.parameter;
             let declared = self.declared.iter().find(is_it)?;
-            let (departure, slope) = declared.departure(values.get(column));
-            Some((i, departure, slope))
+            let (prior_cost, slope) = declared.prior_cost(values.get(column));
+            Some((i, prior_cost, slope))
         })
     }
 
-    /// The cost of free values where so many residuals say as much.
+    /// The cost of free values, if the declared values say as much as `residuals` residuals.
     pub fn cost(&self, columns: &[Column], values: &Values, residuals: f64) -> f64 {
-        let departures = self.departures(columns, values);
-        let of_values = 0.5 * departures.map(|(_, d, _)| d * d).sum::<f64>();
+        let prior_costs = self.prior_costs(columns, values);
+        let of_values = 0.5 * prior_costs.map(|(_, d, _)| d * d).sum::<f64>();
         let bodies = self.free_bodies(columns, values);
         let of_bodies: f64 = bodies.map(|(body, parts, _)| body.cost(&parts)).sum();
         residuals * (of_values + of_bodies)
@@ -100,8 +101,8 @@ impl Prior {
     /// Its gradient and Gauss-Newton matrix.
     pub fn terms(&self, columns: &[Column], values: &Values, residuals: f64) -> WindowTerms {
         let mut terms = WindowTerms::zeros(columns.len());
-        for (i, departure, slope) in self.departures(columns, values) {
-            terms.gradient[i] = residuals * departure * slope;
+        for (i, prior_cost, slope) in self.prior_costs(columns, values) {
+            terms.gradient[i] = residuals * prior_cost * slope;
             terms.hessian[(i, i)] = residuals * slope * slope;
         }
         let bodies = self.terms_of_bodies(columns, values, residuals);
@@ -110,7 +111,7 @@ impl Prior {
         terms
     }
 
-    /// What bodies add to them, with its cost.
+    /// The bodies' part of the terms, with its cost.
     pub fn terms_of_bodies(
         &self,
         columns: &[Column],

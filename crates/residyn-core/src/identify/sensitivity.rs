@@ -12,7 +12,7 @@ pub(super) type Lane = Row<f64, LANES>;
 pub enum Local {
     /// The state at the window's start.
     State,
-    /// The start state and a constant generalised force per joint, which stands for what the model lacks.
+    /// The start state and a constant generalised force per joint, which stands for the dynamics that the model lacks.
     StateAndForce,
     /// None: the torques of a known motion.
     Nothing,
@@ -35,7 +35,7 @@ pub(super) struct Tangent {
     filters: usize,
     /// Indices into the model's parameters.
     pub active: Vec<usize>,
-    /// Of a balance of torques, the columns that the difference of each joint depends on; else empty.
+    /// For a torque balance, the columns that each joint's difference depends on; else empty.
     pub columns_of: Vec<Vec<usize>>,
     pub local: Local,
 }
@@ -88,10 +88,10 @@ impl Tangent {
 
     /// Columns of the sensitivities: shared parameters, then the window's own free values.
     pub fn columns(&self) -> usize {
-        self.active.len() + self.locals()
+        self.active.len() + self.start_states()
     }
 
-    /// The first output with the partial derivatives df/dc of a column c, or `None` where they are zero. Column 0 is the
+    /// The first output with the partial derivatives df/dc of a column c, or `None` if they are zero. Column 0 is the
     /// state itself, whose slopes are the accelerations.
     #[inline(always)]
     fn direct(&self, column: usize) -> Option<usize> {
@@ -114,8 +114,8 @@ impl Tangent {
         moving * self.joints + 1 + self.filters
     }
 
-    /// Of a balance of torques: for each joint the columns that its difference depends on, and the outputs with its slopes by
-    /// them.
+    /// For a torque balance: for each joint the columns that its difference depends on, and the outputs with its slopes
+    /// with respect to them.
     pub fn slopes(&self) -> impl Iterator<Item = (&[usize], std::ops::Range<usize>)> {
         let mut next = self.joints;
         self.columns_of.iter().map(move |columns| {
@@ -126,7 +126,7 @@ impl Tangent {
     }
 
     /// Number of free values of one window.
-    pub fn locals(&self) -> usize {
+    pub fn start_states(&self) -> usize {
         match self.local {
             Local::State => 2 * self.joints,
             Local::StateAndForce => 3 * self.joints,
@@ -134,8 +134,8 @@ impl Tangent {
         }
     }
 
-    /// Of the balance of torques: outputs are the n differences, then for each of them its derivatives with respect to the
-    /// active parameters that it depends on.
+    /// For a torque balance: outputs are the n differences, then for each difference its derivatives with respect to
+    /// the active parameters that it depends on.
     fn of_torques(dynamics: &Dynamics, active: &[usize]) -> Self {
         let n = dynamics.joints;
         let mut graph = Graph::new();
@@ -352,15 +352,15 @@ impl<'t> TangentStepper<'t> {
         std::mem::swap(&mut self.now, &mut self.sum);
     }
 
-    /// Scale the derivatives with respect to each velocity where their damping, over one step, is more than the scheme can
-    /// follow. A joint that sticks is damped far more strongly: its motion stays small, but sensitivities would grow
-    /// without bound where in truth they vanish.
+    /// Scale the derivatives with respect to each velocity if their damping, over one step, is more than the scheme can
+    /// follow. A joint that sticks is damped far more strongly: its motion stays small, but its sensitivities would
+    /// grow without bound although they really vanish.
     #[inline(always)]
     fn limit_damping<S: Simd>(&mut self, simd: S, h: &Lane) {
         let n = self.tangent.joints;
         for part in 0..Lane::parts::<S>() {
             let h = h.get(simd, part);
-            // Friction of each joint alone makes a matrix without negative eigenvalues, of which none is above their sum.
+            // The friction of each joint gives a matrix without negative eigenvalues, none of which exceeds their sum.
             let mut all = h.like(0.0);
             for j in 0..n {
                 let damping = -(self.by_state[(2 * n + 1) * j + n].get(simd, part) * h);
@@ -559,14 +559,14 @@ mod tests {
     #[test]
     fn sensitivities_are_the_slopes_of_every_schemes_steps() {
         let acrobot = Library::built_in().model("acrobot").unwrap();
-        let model = acrobot.with_sign_widths(vec![0.0; 2]).dynamics();
+        let model = acrobot.with_smoothing_velocities(vec![0.0; 2]).dynamics();
         for scheme in SCHEMES {
             are_slopes(&model, [0.7, -0.4, 1.5, -2.0], 3, scheme);
         }
     }
 
-    /// Both joints come to rest within the width over which their friction reverses, in steps that are just short enough: the
-    /// rates of decay are some 270/s and 600/s.
+    /// Both joints come to rest within the width over which their friction reverses, in steps that are just short
+    /// enough: the decay rates are about 270/s and 600/s.
     #[test]
     fn sensitivities_of_joints_that_come_to_rest_are_slopes_while_steps_are_stable() {
         let library = Library::built_in();
@@ -574,14 +574,14 @@ mod tests {
         let on = |joint: usize| FittedEffect::absent(friction, Joint::at(joint));
         let acrobot = library.model("acrobot").unwrap();
         let model = acrobot.with_effects(vec![on(0), on(1)]);
-        let model = model.with_sign_widths(vec![0.02; 2]).dynamics();
+        let model = model.with_smoothing_velocities(vec![0.02; 2]).dynamics();
         let values = [acrobot.values(), vec![6.0, 6.0]].concat();
         let model = model.with_values(values);
         are_slopes(&model, [0.3, -0.2, 0.05, -0.06], 50, RK4);
     }
 
-    /// Held by more friction than the torque that pulls at it, a joint moves by hardly anything; steps are too long to follow
-    /// how fast it comes to rest.
+    /// A joint held by more friction than the torque that drives it hardly moves; the steps are too long to follow how
+    /// fast it comes to rest.
     #[test]
     fn sensitivities_of_a_joint_that_sticks_stay_small() {
         let library = Library::built_in();
@@ -589,7 +589,7 @@ mod tests {
             FittedEffect::absent(library.effect("coulomb_friction").unwrap(), Joint::at(0));
         let pendulum = library.model("pendulum").unwrap();
         let model = pendulum.with_effects(vec![friction]);
-        let model = model.with_sign_widths(vec![2e-3]).dynamics();
+        let model = model.with_smoothing_velocities(vec![2e-3]).dynamics();
         let mut values = model.values();
         *values.last_mut().unwrap() = 4.0;
         let tangent = Tangent::new(&model, &[2], Local::State);

@@ -15,8 +15,8 @@ use crate::sim::{Commands, Point, Window, cut, initial_state};
 /// Least squares over windows of logs.
 ///
 /// By multiple shooting: in each window the model is integrated from a free start state and compared with the logged
-/// positions at every row; the start state is compared with what the rows around it tell. Or by the torques that the
-/// logged motion needs, beside those logged.
+/// positions at every row; the start state is compared with its estimate from the rows around it. Or by inverse
+/// dynamics: the torques that the logged motion needs are compared with the logged ones.
 ///
 /// A copy shares the batches of windows and the smoothed rows with its original.
 #[derive(Clone)]
@@ -27,7 +27,7 @@ pub struct Shooting<'l> {
     pub noise: Vec<f64>,
     measure: Measure,
     prior: Prior,
-    /// The same logs cut into windows of other lengths, as far as these were asked for: shared by all copies.
+    /// The same logs cut into windows of other lengths, for each length requested so far: shared by all copies.
     cuts: Arc<Mutex<Vec<Cut>>>,
 }
 
@@ -36,7 +36,7 @@ pub struct Shooting<'l> {
 enum Measure {
     Motion(Arc<Vec<Pack>>),
     Torques {
-        /// One a log.
+        /// One per log.
         rows: Arc<Vec<Rows>>,
         packs: Arc<Vec<Balance>>,
     },
@@ -51,7 +51,7 @@ struct Cut {
 
 impl<'l> Shooting<'l> {
     /// # Panics
-    /// When `noise` has not one entry a joint of the logs.
+    /// If `noise` does not have one entry per joint of the logs.
     pub fn new(logs: &'l [Log], windows: Vec<Window>, noise: &[f64]) -> Self {
         let mut order: Vec<usize> = (0..windows.len()).collect();
         // Windows of similar length share a pack, which keeps the padding small.
@@ -71,19 +71,20 @@ impl<'l> Shooting<'l> {
         }
     }
 
-    /// The torques of the logged motion, for models compiled by
-    /// [`Model::smoothed_torque_balance`]. Windows in which no row is used are dropped. Friction reverses over the speeds
-    /// `sign_widths`.
+    /// The torques of the logged motion, for models compiled by [`Model::smoothed_torque_balance`]. Windows in which no
+    /// row is used are dropped. Friction reverses over the speeds `smoothing_velocities`.
     ///
     /// # Panics
-    /// When `noise` or `sign_widths` have not one entry a joint of the logs.
+    /// If `noise` or `smoothing_velocities` do not have one entry per joint of the logs.
     pub fn of_torques(
         logs: &'l [Log],
         windows: Vec<Window>,
         noise: &[f64],
-        sign_widths: &[f64],
+        smoothing_velocities: &[f64],
     ) -> Self {
-        let rows = logs.par_iter().map(|log| Rows::of(log, sign_widths));
+        let rows = logs
+            .par_iter()
+            .map(|log| Rows::of(log, smoothing_velocities));
         let rows = rows.collect();
         Self::of_rows(logs, Arc::new(rows), windows, noise)
     }
@@ -115,7 +116,7 @@ impl<'l> Shooting<'l> {
         }
     }
 
-    /// The logs cut into windows of this length in s; they are cut once, however often they are asked for.
+    /// The logs cut into windows of this length in s; each length is cut only once, however often it is requested.
     #[must_use]
     pub fn cut_into(&self, length_s: f64) -> Self {
         let mut cuts = self.cuts.lock().unwrap_or_else(PoisonError::into_inner);
@@ -141,7 +142,7 @@ impl<'l> Shooting<'l> {
         self.with(windows, &self.noise)
     }
 
-    /// The same windows, whose joints have another noise.
+    /// The same windows with other joint noise.
     #[must_use]
     pub fn with_noise(&self, noise: &[f64]) -> Self {
         self.with(self.windows.clone(), noise)
@@ -158,19 +159,19 @@ impl<'l> Shooting<'l> {
         other
     }
 
-    /// What is free in each window, where these are its values.
-    pub(super) fn local(&self, locals: &[Vec<f64>]) -> Local {
+    /// What is free in each window, judged by these values.
+    pub(super) fn local(&self, start_states: &[Vec<f64>]) -> Local {
         let states = 2 * self.noise.len();
         match &self.measure {
             Measure::Torques { .. } => Local::Nothing,
-            Measure::Motion(_) if locals.first().is_some_and(|l| l.len() > states) => {
+            Measure::Motion(_) if start_states.first().is_some_and(|l| l.len() > states) => {
                 Local::StateAndForce
             }
             Measure::Motion(_) => Local::State,
         }
     }
 
-    /// The same windows, of whose start states nothing is known.
+    /// The same windows without estimates of their start states.
     #[must_use]
     pub fn with_free_starts(mut self) -> Self {
         if let Measure::Motion(packs) = &mut self.measure {
@@ -179,30 +180,30 @@ impl<'l> Shooting<'l> {
         self
     }
 
-    /// The same windows of a rig whose parameters are known to be of the size that is declared.
+    /// The same windows, for a rig whose parameters are known to be near the declared ones in size.
     #[must_use]
     pub fn near(mut self, declared: &Model) -> Self {
         self.prior = Prior::near(declared);
         self
     }
 
-    /// The cost of free values that are not those declared.
-    pub(super) fn departure(&self, columns: &[Column], values: &Values) -> f64 {
+    /// The cost of the free values' departure from the declared ones.
+    pub(super) fn prior_cost(&self, columns: &[Column], values: &Values) -> f64 {
         (self.prior).cost(columns, values, self.residuals_of_a_window())
     }
 
     /// Its gradient and Gauss-Newton matrix.
-    pub(super) fn departure_terms(&self, columns: &[Column], values: &Values) -> WindowTerms {
+    pub(super) fn prior_terms(&self, columns: &[Column], values: &Values) -> WindowTerms {
         (self.prior).terms(columns, values, self.residuals_of_a_window())
     }
 
-    /// What is declared of bodies, as information on the free values, with what the departure costs.
+    /// What is declared of bodies, as information on the free values, with the cost of their departure.
     pub(super) fn declared_bodies(&self, columns: &[Column], values: &Values) -> WindowTerms {
         (self.prior).terms_of_bodies(columns, values, self.residuals_of_a_window())
     }
 
-    /// So many residuals say as much as the declared values do: they are correlated, and a few windows overrule what is
-    /// declared. In a motion the joints depend on each other; torques of joints are off one by one.
+    /// The number of residuals that say as much as the declared values do: residuals are correlated, and a few windows
+    /// overrule the declared values. In a motion the joints depend on each other; joint torques err independently.
     #[allow(clippy::cast_precision_loss)] // some thousands
     fn residuals_of_a_window(&self) -> f64 {
         let residuals = match &self.measure {
@@ -226,7 +227,7 @@ impl<'l> Shooting<'l> {
     }
 
     /// Initial guess of each window's start state, followed by `extra` zeros.
-    pub fn initial_locals(&self, extra: usize) -> Vec<Vec<f64>> {
+    pub fn initial_start_states(&self, extra: usize) -> Vec<Vec<f64>> {
         if let Measure::Torques { .. } = self.measure {
             return vec![Vec::new(); self.windows.len()];
         }
@@ -246,13 +247,13 @@ impl<'l> Shooting<'l> {
         &self,
         dynamics: &Dynamics,
         values: &Values,
-        locals: &[Vec<f64>],
+        start_states: &[Vec<f64>],
     ) -> Vec<Vec<f64>> {
         let n = dynamics.joints;
         let of_motion = |pack: &Pack, commands: &[Commands<'_>]| {
             let mut all: Vec<(usize, Vec<f64>)> =
                 pack.windows.iter().map(|&w| (w, Vec::new())).collect();
-            pack.roll(dynamics, values, commands, locals, |row, q| {
+            pack.roll(dynamics, values, commands, start_states, |row, q| {
                 for (lane, (window, residuals)) in all.iter_mut().enumerate() {
                     if row < self.windows[*window].rows() {
                         residuals.extend((0..n).map(|j| {
@@ -273,26 +274,32 @@ impl<'l> Shooting<'l> {
         out
     }
 
-    /// Root mean square of what a model leaves on each joint, in the unit of the noise.
-    pub fn left_by(&self, dynamics: &Dynamics, values: &Values, locals: &[Vec<f64>]) -> Vec<f64> {
-        let residuals = self.residuals(dynamics, values, locals);
+    /// Root mean square of a model's residual on each joint, in the unit of the noise.
+    pub fn left_by(
+        &self,
+        dynamics: &Dynamics,
+        values: &Values,
+        start_states: &[Vec<f64>],
+    ) -> Vec<f64> {
+        let residuals = self.residuals(dynamics, values, start_states);
         let shares = deviations(&residuals, dynamics.joints);
         let noise = self.noise.iter().zip(shares);
         noise.map(|(noise, share)| noise * share).collect()
     }
 
-    /// The Huber loss of each window at residual scale `scale`, and of its start state; infinite where the model diverges.
+    /// The Huber loss of each window at residual scale `scale`, including its start state; infinite if the model
+    /// diverges.
     pub fn costs(
         &self,
         dynamics: &Dynamics,
         values: &Values,
-        locals: &[Vec<f64>],
+        start_states: &[Vec<f64>],
         scale: f64,
     ) -> Vec<f64> {
         let per_pack = self.per_pack(
             dynamics,
             values,
-            |pack, commands| pack.costs(dynamics, values, commands, locals, scale),
+            |pack, commands| pack.costs(dynamics, values, commands, start_states, scale),
             |pack, data| pack.costs(dynamics, values, data, scale),
         );
         let mut out = vec![f64::INFINITY; self.windows.len()];
@@ -303,7 +310,7 @@ impl<'l> Shooting<'l> {
         out
     }
 
-    /// What each window gives, all packs at once.
+    /// The result of each window, computed for all packs at once.
     fn per_pack<T: Send>(
         &self,
         dynamics: &Dynamics,
@@ -342,13 +349,13 @@ impl<'l> Shooting<'l> {
         dynamics: &Dynamics,
         tangent: &Tangent,
         values: &Values,
-        locals: &[Vec<f64>],
+        start_states: &[Vec<f64>],
         scale: f64,
     ) -> Vec<WindowTerms> {
         let mut all = self.per_pack(
             dynamics,
             values,
-            |pack, commands| pack.linearise(tangent, values, commands, locals, scale),
+            |pack, commands| pack.linearise(tangent, values, commands, start_states, scale),
             |pack, data| pack.linearise(tangent, values, data, scale),
         );
         all.sort_by_key(|(window, _)| *window);
@@ -371,7 +378,7 @@ fn deviations(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
     sums.into_iter().map(root).collect()
 }
 
-/// Half width of the cubics that tell start states, in s, one a log.
+/// Half width of the cubics that estimate start states, in s, one per log.
 fn half_widths(logs: &[Log]) -> Vec<f64> {
     let of_log = |log: &Log| half_width_s(log.median_step());
     logs.iter().map(of_log).collect()
@@ -442,7 +449,7 @@ mod tests {
         log.masked.push(Vec::new());
         let logs = [log];
         let shooting = Shooting::of_torques(&logs, cut(&logs, 0.5), &[0.5, 0.2], &[0.01; 2]);
-        let locals = shooting.initial_locals(0);
+        let start_states = shooting.initial_start_states(0);
         let free = |k: &usize| !model.parameters[*k].fixed;
         let active: Vec<usize> = (0..model.parameters.len()).filter(free).collect();
         let tangent = Tangent::new(&model, &active, Local::Nothing);
@@ -454,10 +461,10 @@ mod tests {
             own: Vec::new(),
         };
         let cost = |values: &[f64]| -> f64 {
-            let costs = shooting.costs(&model, &point(values), &locals, 1.0);
+            let costs = shooting.costs(&model, &point(values), &start_states, 1.0);
             costs.iter().sum()
         };
-        let terms = shooting.linearise(&model, &tangent, &point(&values), &locals, 1.0);
+        let terms = shooting.linearise(&model, &tangent, &point(&values), &start_states, 1.0);
         assert!(terms.len() > 1);
         for (column, k) in active.into_iter().enumerate() {
             let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
@@ -485,7 +492,8 @@ mod tests {
         let logs = [log()];
         let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[0.05]);
         for local in [Local::State, Local::StateAndForce] {
-            let locals = shooting.initial_locals(usize::from(local == Local::StateAndForce));
+            let start_states =
+                shooting.initial_start_states(usize::from(local == Local::StateAndForce));
             let tangent = Tangent::new(&model, &[1, 2, 3, 4], local);
             for (delay, lag) in [(0.0, 0.0), (0.0073, 0.015)] {
                 let values = [15.0, 3.0, delay, lag, 0.01, 0.0];
@@ -495,11 +503,12 @@ mod tests {
                 };
                 let cost = |values: &[f64]| -> f64 {
                     shooting
-                        .costs(&model, &point(values), &locals, 1.0)
+                        .costs(&model, &point(values), &start_states, 1.0)
                         .iter()
                         .sum()
                 };
-                let terms = shooting.linearise(&model, &tangent, &point(&values), &locals, 1.0);
+                let terms =
+                    shooting.linearise(&model, &tangent, &point(&values), &start_states, 1.0);
                 for (column, k) in [1, 2, 3, 4].into_iter().enumerate() {
                     let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
                     let mut moved = values;

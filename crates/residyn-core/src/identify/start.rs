@@ -1,22 +1,23 @@
 use crate::data::{LocalCubic, Log, local_cubic, rows_around};
 
-/// What a log tells of the state at one of its rows: angles, then velocities.
+/// A log's estimate of the state at one of its rows: angles, then velocities.
 pub(super) struct Start {
     pub state: Vec<f64>,
-    /// 1 / standard deviation of each; 0 where the log does not tell it.
+    /// 1 / standard deviation of each; 0 if the log does not determine it.
     pub weight: Vec<f64>,
 }
 
-/// The estimate shares rows with the window that it begins, and encoders err in steps: it counts as if it had so many
+/// The estimate shares rows with the window that it begins, and encoders err in steps: it counts as if it had this many
 /// times the standard deviation of white noise.
 const CAUTION: f64 = 2.0;
-/// On either side of the row there are at least so many rows: beyond the end of its points a cubic errs much more.
+/// There must be at least this many rows on either side of the row: beyond the end of its points a cubic errs much
+/// more.
 const FEWEST_ROWS: usize = 2;
 
 impl Start {
-    /// The state at a row, by the cubics over `half_width` s on either side that open-loop errors start from; `noise` is the standard deviation of each
-    /// joint's position. A window's free start state is held to it, so that a model that is wrong cannot make up for it
-    /// by a start state that the rig never had.
+    /// The state at a row, by the cubics over `half_width` s on either side that open-loop errors start from; `noise`
+    /// is the standard deviation of each joint's position. A window's free start state is held near it, so that a wrong
+    /// model cannot compensate with a start state that the rig never had.
     pub fn of(log: &Log, row: usize, half_width: f64, noise: &[f64]) -> Self {
         let around = rows_around(&log.time, row, half_width);
         let is_between = row - around.start >= FEWEST_ROWS && around.end - row > FEWEST_ROWS;
@@ -29,7 +30,7 @@ impl Start {
         let of_joint = |(q, noise): (&Vec<f64>, &f64)| {
             let found = local_cubic(&log.time, q, row, half_width).filter(|_| is_between);
             found.map_or([(0.0, 0.0); 2], |found| {
-                // What noise does not explain of the cubic's residuals is motion that a cubic does not follow.
+                // The part of the cubic's residuals that noise does not explain is motion that a cubic does not follow.
                 let beyond = (found.rms.powi(2) - (CAUTION * noise).powi(2))
                     .max(0.0)
                     .sqrt();
@@ -54,7 +55,7 @@ mod tests {
     use crate::data::Log;
 
     #[test]
-    fn the_state_is_told_with_its_uncertainty_where_rows_are_on_both_sides() {
+    fn the_state_is_reported_with_its_uncertainty_where_rows_are_on_both_sides() {
         let time: Vec<f64> = (0..100).map(|row| 0.002 * f64::from(row)).collect();
         let mut log = Log::empty(1);
         log.q = vec![time.iter().map(|t| 0.3 + 2.0 * t).collect()];

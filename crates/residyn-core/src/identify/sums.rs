@@ -25,7 +25,8 @@ pub fn huber(residual: f64) -> f64 {
     loss(residual).0
 }
 
-/// Measurements that are added at once: the sums outgrow the processor's nearest memory, and are fetched once for all of them.
+/// Measurements that are added at once: the sums exceed the processor's first-level cache, and are fetched once for all
+/// of these measurements.
 const TOGETHER: usize = 8;
 
 /// Running sums of the normal equations of all lanes. The matrix is stored as its upper triangle.
@@ -98,7 +99,7 @@ impl Sums {
 
     fn add_waiting(&mut self) {
         let waiting = &mut self.waiting;
-        // Places that are not filled hold a measurement which has been added.
+        // Unfilled places hold a measurement that has already been added.
         for at in waiting.count..TOGETHER {
             waiting.residuals[at] = Row::splat(0.0);
             waiting.weights[at] = Row::splat(0.0);
@@ -107,7 +108,7 @@ impl Sums {
         Lane::dispatch(AddWaiting(self));
     }
 
-    /// The normal equations of the first lanes, so many of them.
+    /// The normal equations of the first `count` lanes.
     pub fn lanes(mut self, count: usize) -> Vec<WindowTerms> {
         self.add_waiting();
         (0..count).map(|lane| self.lane(lane)).collect()

@@ -8,10 +8,10 @@ use crate::sim::cut;
 
 /// Length of the windows that are left out or resampled as one, s.
 const WINDOW_S: f64 = 0.5;
-/// The noise of the joints is that of the residuals, which depend on it: it has settled after so many fits.
+/// The noise of the joints is that of the residuals, which depend on it: it has settled after this many fits.
 const FITS: usize = 3;
 
-/// A model fitted by torques.
+/// A model fitted to torques.
 pub struct TorqueFit<'l> {
     pub model: Model,
     pub fit: Fit,
@@ -19,8 +19,8 @@ pub struct TorqueFit<'l> {
     pub shooting: Shooting<'l>,
 }
 
-/// Fit a model to the torques that the motion in the logs needs, near the values of `declared`. A joint counts by how well
-/// its torque can be told; bodies stay physical.
+/// Fit a model to the torques that the motion in the logs needs, near the values of `declared`. A joint counts by how
+/// well its torque is predicted; bodies stay physical.
 ///
 /// # Errors
 /// A model that gives accelerations or logs of less than two seconds, as [`FitError::NoWindow`], and those of [`fit`].
@@ -32,7 +32,7 @@ pub fn fit_torques<'l>(
     let mut model = with_physical_bodies(model);
     let mut noise = vec![1.0; model.joints];
     let windows = cut(logs, WINDOW_S);
-    let smoothed = Shooting::of_torques(logs, windows, &noise, &model.sign_widths());
+    let smoothed = Shooting::of_torques(logs, windows, &noise, &model.smoothing_velocities());
     let smoothed = smoothed.near(declared);
     let mut found = None;
     for _ in 0..FITS {
@@ -41,10 +41,10 @@ pub fn fit_torques<'l>(
         let parameters = balance.parameters.iter().enumerate();
         let free = parameters.filter(|(_, parameter)| !parameter.fixed);
         let active: Vec<usize> = free.map(|(k, _)| k).collect();
-        let locals = shooting.initial_locals(0);
-        let (values, fitted) = fit(&shooting, &balance, &active, locals, None)?;
+        let start_states = shooting.initial_start_states(0);
+        let (values, fitted) = fit(&shooting, &balance, &active, start_states, None)?;
         let balance = values.put_into(&balance, logs);
-        noise = shooting.left_by(&balance, &values, &fitted.locals);
+        noise = shooting.left_by(&balance, &values, &fitted.start_states);
         model = model.at(&balance);
         found = Some((fitted, shooting));
     }
@@ -56,7 +56,7 @@ pub fn fit_torques<'l>(
     })
 }
 
-/// The same model where bodies that none can be have the values of the nearest that one can.
+/// The same model with bodies that are not physical replaced by the nearest physical ones.
 fn with_physical_bodies(model: &Model) -> Model {
     let mut model = model.clone();
     for body in model.inertias() {

@@ -1,10 +1,10 @@
 use nalgebra::DVector;
 
 use crate::data::Log;
-use crate::model::{Dynamics, OwnValue, Parameter};
+use crate::model::{Dynamics, Parameter, PerLogValue};
 use crate::sim::Window;
 
-/// The value that a parameter has in one log alone.
+/// The value that a parameter has in one log only.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Own {
     /// Index of the log.
@@ -15,11 +15,11 @@ pub struct Own {
 }
 
 /// Values of all parameters of a model as a fit to a list of logs moves them: those that hold in every log, and those
-/// that one log has of its own, by its place in that list.
+/// of a single log, by its place in that list.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Values {
     /// One value per parameter, in the model's order. For a parameter with a value per log, the one that holds in logs
-    /// without a value of their own.
+    /// without their own value.
     pub common: Vec<f64>,
     pub own: Vec<Own>,
 }
@@ -28,7 +28,7 @@ impl Values {
     /// The values of a model on these logs.
     pub fn of(dynamics: &Dynamics, logs: &[Log]) -> Self {
         let in_log = |(index, log)| {
-            dynamics.own_in(log).map(move |own| Own {
+            dynamics.values_in(log).map(move |own| Own {
                 log: index,
                 parameter: own.parameter,
                 value: own.value,
@@ -46,7 +46,7 @@ impl Values {
         found
             .own
             .retain(|own| !logs.iter().any(|log| log.is_called(&own.log)));
-        found.own.extend(self.own.iter().map(|own| OwnValue {
+        found.own.extend(self.own.iter().map(|own| PerLogValue {
             log: logs[own.log].path.display().to_string(),
             parameter: own.parameter,
             value: own.value,
@@ -122,7 +122,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// One column for each active parameter, or one for each log that has windows where it differs by log.
+    /// One column for each active parameter or, if it differs by log, one for each log that has windows.
     pub fn new(parameters: &[Parameter], active: &[usize], windows: &[Window]) -> Self {
         let mut logs: Vec<usize> = windows.iter().map(|window| window.log).collect();
         logs.sort_unstable();

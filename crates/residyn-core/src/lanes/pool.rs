@@ -28,8 +28,8 @@ impl WorkerPool {
     }
 
     /// Call `body` while worker threads take part in every [`WorkerPool::run`] within it, each of which must be given
-    /// this `work`. There is a worker for every core of rayon's pool but the caller's, and none where the caller is
-    /// itself a thread of that pool, whose cores are busy already.
+    /// this `work`. There is a worker for every core of rayon's pool but the caller's, and none if the caller is itself
+    /// a thread of that pool, whose cores are busy already.
     pub fn with_workers<R>(&self, work: &(impl Fn(usize) + Sync), body: impl FnOnce() -> R) -> R {
         let workers = match rayon::current_thread_index() {
             Some(_) => 0,
@@ -97,7 +97,7 @@ impl WorkerPool {
     }
 }
 
-/// Counts a task as done even where it panics: the caller must not wait for ever.
+/// Counts a task as done even if it panics: the caller must not wait for ever.
 struct DoneOnDrop<'a>(&'a AtomicUsize);
 
 impl Drop for DoneOnDrop<'_> {
@@ -106,7 +106,7 @@ impl Drop for DoneOnDrop<'_> {
     }
 }
 
-/// Stops the workers even where the caller panics.
+/// Stops the workers even if the caller panics.
 struct StopOnDrop<'a>(&'a WorkerPool);
 
 impl Drop for StopOnDrop<'_> {

@@ -15,7 +15,7 @@ impl<T: Copy, const W: usize> Row<T, W> {
 }
 
 impl<T: Element, const W: usize> Row<T, W> {
-    /// Run `work` with the widest vectors that divide a row, or with single numbers where none does.
+    /// Run `work` with the widest vectors that divide a row, or with single numbers if none does.
     pub fn dispatch<F: WithSimd>(work: F) -> F::Output {
         Arch::new().dispatch(Fitting::<T, F, W>(work, std::marker::PhantomData))
     }

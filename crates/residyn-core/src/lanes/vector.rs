@@ -32,7 +32,7 @@ pub trait Element:
     fn neg<S: Simd>(simd: S, a: Self::Register<S>) -> Self::Register<S>;
     fn abs<S: Simd>(simd: S, a: Self::Register<S>) -> Self::Register<S>;
     fn sqrt<S: Simd>(simd: S, a: Self::Register<S>) -> Self::Register<S>;
-    /// a b + c, rounded once where the processor has a fused multiply-add.
+    /// a b + c, rounded once if the processor has a fused multiply-add.
     fn mul_add<S: Simd>(
         simd: S,
         a: Self::Register<S>,
@@ -58,7 +58,7 @@ pub trait Element:
         a: Self::Register<S>,
         sign: Self::Register<S>,
     ) -> Self::Register<S>;
-    /// 2^k for integers k where that is a normal number.
+    /// 2^k for integers k if that is a normal number.
     fn power_of_two<S: Simd>(simd: S, k: Self::Register<S>) -> Self::Register<S>;
     /// The numbers of one register.
     fn numbers<S: Simd>(register: &mut Self::Register<S>) -> &mut [Self];

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use super::dynamics::{Dynamics, OwnValue, Parameter};
+use super::dynamics::{Dynamics, Parameter, PerLogValue};
 use super::effect::{Effect, Entry, PLACE, RATIO};
 use super::filter::Filter;
 use super::fitted::FittedEffect;
@@ -12,8 +12,8 @@ use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
 impl Model {
     /// The equations and effects compiled into one program, with the model's own values and smoothing.
     ///
-    /// Filters of the command act first, then the drive makes a torque of it, then come other effects of the torque, in their order, then forces are added.
-    /// `load` is the torque before the latter.
+    /// Command filters act first; then the drive turns the command into a torque, the other effects on the torque
+    /// follow in their order, and forces are added last. `load` is the torque before forces are added.
     pub fn dynamics(&self) -> Dynamics {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &self.effects, &sign);
@@ -32,15 +32,16 @@ impl Model {
             program: assembly.graph.finish(&outputs),
             filters: self.filters(),
             reading,
-            own: self.own_values(),
+            own: self.per_log_values(),
         }
     }
 
-    /// The balance of torques, compiled like [`Model::dynamics`]: outputs of the program are the torques (N m, or N) of the
-    /// joints by which a motion needs more than acts, after all effects; zero where the model is right. Where a command changes
-    /// the torque that acts by more or less than itself, the difference is that of the commands, to first order. Its inputs are those
-    /// of [`Dynamics`] with the accelerations `qdd1..qddn` before the parameters. `None` for a model that gives accelerations,
-    /// which has no torques, and for one that is driven by commands, of which logs show no torques.
+    /// The torque balance, compiled like [`Model::dynamics`]: the program's outputs are, for each joint, the torque
+    /// (N m, or N) that a motion needs beyond what acts after all effects; zero if the model is right. If the acting
+    /// torque does not change one to one with the command, the difference is expressed as a command, to first order.
+    /// Its inputs are those of [`Dynamics`] with the accelerations `qdd1..qddn` before the parameters. `None` for a
+    /// model that gives accelerations, which has no torques, and for one that is driven by commands, since its logs
+    /// hold no torques.
     pub fn torque_balance(&self) -> Option<Dynamics> {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &self.effects, &sign);
@@ -48,8 +49,8 @@ impl Model {
         self.balanced(assembly, &qdd)
     }
 
-    /// The same of low-passed torques, which do not jump where friction does: inputs after the accelerations are the directions
-    /// `direction1..directionn`, signs of the velocities low-passed like the torques.
+    /// The same for low-passed torques, which do not jump where friction does: the inputs after the accelerations are
+    /// the directions `direction1..directionn`, the signs of the velocities low-passed like the torques.
     pub fn smoothed_torque_balance(&self) -> Option<Dynamics> {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &self.effects, &sign);
@@ -72,7 +73,7 @@ impl Model {
         let difference = |j: usize| {
             let of_torques = graph.sub(needed[j], assembly.tau[j]);
             let slope = graph.gradient(&assembly.tau[j..=j], &[one], &commanded[j..=j])[0];
-            // A command that changes nothing is not told.
+            // A command without effect has slope zero: its difference stays a torque.
             let slope = graph.select(slope, slope, one);
             graph.div(of_torques, slope)
         };
@@ -85,12 +86,12 @@ impl Model {
             parameters: assembly.parameters,
             filters: self.filters(),
             reading: None,
-            own: self.own_values(),
+            own: self.per_log_values(),
         })
     }
 
-    /// The mass matrix, row by row, and the bias as a program of the inputs of [`Dynamics`]; `None` for a model that gives
-    /// accelerations.
+    /// The mass matrix, row by row, and the bias as a program with the inputs of [`Dynamics`]; `None` for a model that
+    /// gives accelerations.
     pub(super) fn mass_and_bias_program(&self) -> Option<Program> {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &self.effects, &sign);
@@ -112,7 +113,7 @@ impl Model {
         parameters
     }
 
-    /// How many parameters fits may change, those of effects among them.
+    /// How many parameters fits may change, effect parameters included.
     pub fn free_parameters(&self) -> usize {
         let all = self.all_parameters();
         all.iter().filter(|parameter| !parameter.fixed).count()
@@ -130,10 +131,10 @@ impl Model {
         self.placed().filter_map(filter).collect()
     }
 
-    /// The values that single logs have of their own, each of the parameter at that index among all.
-    pub fn own_values(&self) -> Vec<OwnValue> {
+    /// The per-log values, each with its parameter's index among all parameters.
+    pub fn per_log_values(&self) -> Vec<PerLogValue> {
         let of_effect = |(effect, place): (&FittedEffect, Range<usize>)| {
-            let own = effect.own.iter().map(move |own| OwnValue {
+            let own = effect.own.iter().map(move |own| PerLogValue {
                 parameter: place.start + own.parameter,
                 ..own.clone()
             });
@@ -146,7 +147,7 @@ impl Model {
 /// An effect on the sum of two joints' coordinates, each with its share.
 struct Coupling {
     shares: [(Joint, Node); 2],
-    /// Generalised force of the sum, without what its inertia takes.
+    /// Generalised force on the sum, without the inertial part.
     force: Node,
     inertia: Node,
 }
@@ -165,7 +166,7 @@ struct Assembly<'a> {
     tau: Vec<Node>,
     time: Node,
     declared: Vec<Node>,
-    /// The signs of the velocities, where they are given.
+    /// The signs of the velocities, if given.
     directions: Vec<Node>,
 }
 
@@ -209,7 +210,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// New inputs, one a joint.
+    /// New inputs, one per joint.
     fn of_joints(&mut self, stem: &str) -> Vec<Node> {
         let joints = Joint::all(self.system.joints);
         joints
@@ -241,7 +242,7 @@ impl<'a> Assembly<'a> {
         self.tau = drive.torques(&mut self.graph, &scope);
     }
 
-    /// The angles of the state are those of the sensors; everything that follows uses the rig's own.
+    /// The state holds the sensors' angles; everything that follows uses the rig's.
     fn apply_sensors(&mut self) {
         for (index, joint, formula) in self.entries(Effect::is_of_sensor) {
             self.q[joint] = self.effect_node(index, formula);
@@ -274,7 +275,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Mass and place of the load at the tip, where there is one.
+    /// Mass and position of the load at the tip, if there is one.
     fn payload(&mut self) -> Option<[Node; 4]> {
         let is_load = |effect: &Effect| matches!(effect.entry, Entry::Payload(_));
         let (index, _, mass) = self.entries(is_load).pop()?;
@@ -328,7 +329,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The effects that enter in one way: number, joint and formula.
+    /// The effects that enter in one particular way: index, joint and formula.
     fn entries(&self, is_wanted: impl Fn(&Effect) -> bool) -> Vec<(usize, Joint, &'a Formula)> {
         let effects = self.effects.iter().enumerate();
         let wanted = effects.filter(|(_, (effect, _))| is_wanted(&effect.effect));
@@ -339,7 +340,7 @@ impl<'a> Assembly<'a> {
             .collect()
     }
 
-    /// An effect's formula in terms of its joint.
+    /// An effect's formula in the variables of its joint.
     fn effect_node(&mut self, index: usize, formula: &Formula) -> Node {
         let (effect, nodes) = &self.effects[index];
         let joint = effect.joint;
@@ -387,7 +388,7 @@ impl<'a> Assembly<'a> {
         Some((matrix, bias))
     }
 
-    /// The torques that accelerations need.
+    /// The torques that these accelerations need.
     fn torques(&mut self, qdd: &[Node]) -> Option<Vec<Node>> {
         let scope = self.declared_scope();
         let (mut matrix, bias) = match &self.system.equations.motion {
@@ -448,12 +449,12 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The angles of the declared equations: those of the rig after effects on them.
+    /// The angles in the declared equations: the rig's, after effects on them.
     fn declared_angles(&mut self) -> Vec<Node> {
         self.turned(|effect| matches!(effect.entry, Entry::Angle(_)) && !effect.is_of_sensor())
     }
 
-    /// The measured angles, where effects change them.
+    /// The measured angles, if effects change them.
     fn reading(&mut self) -> Option<Program> {
         let stands_between = |effect: &Effect| matches!(effect.entry, Entry::Reading(_));
         let shown = self.turned(stands_between);
@@ -469,7 +470,7 @@ impl<'a> Assembly<'a> {
         std::mem::replace(&mut self.q, before)
     }
 
-    /// The names of the declared equations: angles and torques after effects on them.
+    /// The names in the declared equations: angles and torques after effects on them.
     fn declared_scope(&mut self) -> Scope {
         let angles = self.declared_angles();
         let mut scope = Scope::new(self.narrowest_sign());
@@ -520,14 +521,14 @@ fn width(sign: &SignForm) -> f64 {
     }
 }
 
-/// A formula that was checked when the file was read, in a graph.
+/// Lowers a formula into a graph; it was checked when the file was read.
 pub(super) fn lower(scope: &Scope, graph: &mut Graph, formula: &Located<Formula>) -> Node {
     scope
         .lower(graph, &formula.value)
         .expect("formulas were checked when the file was read")
 }
 
-/// A program with its last `accelerations` inputs before the parameters.
+/// The same program with its parameters as the last inputs.
 fn with_parameters_last(program: &Program, joints: usize, parameters: usize) -> Program {
     let (moving, rest) = program.inputs().split_at(3 * joints + 1);
     let (parameters, more) = rest.split_at(parameters);

@@ -77,7 +77,7 @@ impl Bodies {
         self.loaded(graph, scope, None)
     }
 
-    /// The same with a point on the last body: its mass (kg), and where it is in the frame of that body (m).
+    /// As above, with a point mass on the last body: its mass (kg) and its position in that body's frame (m).
     pub fn loaded<'g>(
         &self,
         graph: &'g mut Graph,
@@ -95,7 +95,7 @@ impl Bodies {
     }
 }
 
-/// A body with a point of this mass on it.
+/// A body with a point mass added.
 fn with_point(graph: &mut Graph, body: &Body<Node>, [mass, x, y, z]: [Node; 4]) -> Body<Node> {
     let place = [x, y, z];
     let moment = place.map(|along| graph.mul(mass, along));

@@ -10,9 +10,9 @@ pub struct Call {
     pub command: String,
     /// UTC, as 2026-11-23T21:45:00Z
     pub began: String,
-    /// until its results were written, s
+    /// time until its results were written, s
     pub took_s: f64,
-    /// the files that it read; what is built in or simulated is none
+    /// the files that it read; built-in and simulated inputs are not listed
     pub inputs: Vec<InputFile>,
 }
 
@@ -23,6 +23,6 @@ pub struct InputFile {
     pub role: String,
     /// as given
     pub path: String,
-    /// of its bytes, 64 hexadecimal digits
+    /// SHA-256 of its bytes, 64 hexadecimal digits
     pub sha256: String,
 }

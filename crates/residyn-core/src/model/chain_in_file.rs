@@ -11,7 +11,7 @@ use crate::expr::Formula;
 const KEYS: &[&str] = &[
     "joint", "ratio", "offset", "slides", "origin", "axis", "across", "mass", "moment", "inertia",
 ];
-/// Directions that differ by less than this (rad) from being parallel give no frame.
+/// Directions within this angle (rad) of being parallel give no frame.
 const PARALLEL: f64 = 1e-6;
 
 pub(super) fn chain(

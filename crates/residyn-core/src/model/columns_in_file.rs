@@ -45,7 +45,7 @@ pub(super) fn columns(
     Ok(columns)
 }
 
-/// One column a joint.
+/// One column per joint.
 fn list(
     section: &Section<'_>,
     quantity: Quantity,

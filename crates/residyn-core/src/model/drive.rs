@@ -15,7 +15,7 @@ use crate::lanes::Row;
 pub(super) struct Drive(Vec<Located<Formula>>);
 
 impl Drive {
-    /// The table `[drive]`: one formula a joint, `tau1` to `taun`.
+    /// The table `[drive]`: one formula per joint, `tau1` to `taun`.
     pub fn read(
         document: &Document,
         section: &Section<'_>,
@@ -55,7 +55,7 @@ impl Drive {
 }
 
 impl Model {
-    /// What the rig is driven by: torques, or commands of which `[drive]` makes torques.
+    /// What the rig is driven by: torques, or commands that `[drive]` turns into torques.
     pub fn driven_by(&self) -> Quantity {
         match self.equations.drive {
             None => Quantity::Torque,
@@ -72,8 +72,8 @@ impl Model {
         states.chain(["t".to_owned()]).chain(parameters).collect()
     }
 
-    /// The torques of the drives along a log (`[joint][row]`, N m or N), at the declared values, before any effect; what the
-    /// log holds where it holds torques.
+    /// The drives' torques along a log (`[joint][row]`, N m or N), at the declared values, before any effect; the log's
+    /// own torques if it holds torques.
     pub fn drive_torques(&self, log: &Log) -> Vec<Vec<f64>> {
         let Some(program) = self.drive_program() else {
             return log.tau.clone();
@@ -110,7 +110,7 @@ impl Model {
         }
     }
 
-    /// The torques of the drives as a program of its command, state, time and parameters.
+    /// The drives' torques as a program of command, state, time and parameters.
     pub fn drive_program(&self) -> Option<Program> {
         let drive = self.equations.drive.as_ref()?;
         let mut graph = Graph::new();

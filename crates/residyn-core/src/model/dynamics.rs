@@ -15,15 +15,16 @@ pub struct Parameter {
     pub value: f64,
     /// SI, as text; empty for a pure number.
     pub unit: String,
-    /// Lowest and highest admissible value; infinite where there is none.
+    /// Lowest and highest admissible value; infinite if there is no bound.
     pub bounds: [f64; 2],
     /// Held at `value` in every fit.
     pub fixed: bool,
-    /// Takes a value of its own in each log.
+    /// Takes a separate value in each log.
     pub per_log: bool,
     /// 95 % interval, once a fit has found one.
     pub ci95: Option<[f64; 2]>,
-    /// Magnitude by which steps are scaled: that of the declared value, or 1 if it is zero; typical for effects.
+    /// Magnitude by which steps are scaled: that of the declared value, or 1 if it is zero; the typical one for
+    /// effects.
     pub scale: f64,
 }
 
@@ -41,16 +42,16 @@ impl Parameter {
 
 /// The value of a parameter in one log.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OwnValue {
+pub struct PerLogValue {
     /// The log's path or name.
     pub log: String,
-    /// Index into the parameters of what carries it: an effect or a compiled model.
+    /// Index into the parameters of its owner: an effect or a compiled model.
     pub parameter: usize,
     pub value: f64,
     pub ci95: Option<[f64; 2]>,
 }
 
-impl OwnValue {
+impl PerLogValue {
     /// The log's file name.
     pub fn log_name(&self) -> String {
         let name = Path::new(&self.log).file_name();
@@ -80,7 +81,7 @@ pub struct Dynamics {
     /// acted until then.
     pub reading: Option<Program>,
     /// Values of parameters in single logs; `parameter` is an index into `parameters`.
-    pub own: Vec<OwnValue>,
+    pub own: Vec<PerLogValue>,
 }
 
 impl Dynamics {
@@ -98,18 +99,18 @@ impl Dynamics {
         self
     }
 
-    /// The model in a log: with the values that its parameters have there.
+    /// The model with the values that its parameters have in this log.
     pub fn in_log(&self, log: &Log) -> Cow<'_, Self> {
         let mut in_log = Cow::Borrowed(self);
-        for own in self.own_in(log) {
+        for own in self.values_in(log) {
             in_log.to_mut().parameters[own.parameter].value = own.value;
         }
         in_log
     }
 
     /// The values of parameters in one log, which is found by its path or else by its file name.
-    pub fn own_in<'a>(&'a self, log: &'a Log) -> impl Iterator<Item = &'a OwnValue> {
-        let is_path = |own: &OwnValue| log.path.as_os_str() == own.log.as_str();
+    pub fn values_in<'a>(&'a self, log: &'a Log) -> impl Iterator<Item = &'a PerLogValue> {
+        let is_path = |own: &PerLogValue| log.path.as_os_str() == own.log.as_str();
         let by_path = move |parameter: usize| {
             let mut own = self.own.iter();
             own.any(|own| own.parameter == parameter && is_path(own))

@@ -2,18 +2,19 @@ use super::error::ModelError;
 use super::filter::CommandFilter;
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm, suggestion};
 
-/// What a formula of an effect may mention besides its parameters.
+/// Names that an effect's formula may mention besides its parameters.
 pub const EFFECT_NAMES: [&str; 5] = ["q", "qd", "tau", "load", "t"];
 
-/// What a formula on the sum of two joints may mention, and the parameter that is the share of the next joint in it.
+/// Names that a formula on the sum of two joints may mention, and the parameter that is the next joint's share in the
+/// sum.
 pub(super) const COUPLING_NAMES: [&str; 4] = ["q", "qd", "qdd", "t"];
 pub(super) const RATIO: &str = "r";
 
-/// Where a payload is: parameters of that name.
+/// The position of a payload: parameters with these names.
 pub(super) const PLACE: [&str; 3] = ["x", "y", "z"];
 
-/// Commands (N m or N) at which torques that act are compared, on either side of zero, and the step between them: effects are
-/// typically of desktop rigs.
+/// Number of commands on either side of zero at which acting torques are compared, and the step between them (N m or
+/// N): typical values are for desktop rigs.
 const COMMANDS: i32 = 60;
 const COMMAND_STEP: f64 = 0.05;
 
@@ -24,7 +25,7 @@ pub struct Effect {
     pub about: String,
     pub entry: Entry,
     pub parameters: Vec<EffectParameter>,
-    /// A condition on the parameters, which holds where it is positive.
+    /// A condition on the parameters, which holds if it is positive.
     pub valid_if: Option<Formula>,
     /// Simpler effects that are special cases of this one.
     pub contains: Vec<String>,
@@ -33,8 +34,8 @@ pub struct Effect {
     pub shown_by: String,
     /// Acts only where gravity's direction enters: on the first joint of a chain.
     pub first_joint_only: bool,
-    /// Most machines have it, on every joint: such effects are tried together before all others, first those of rank 1, then those
-    /// up to rank 2, and so on. Those of rank 1 are also what a model is given before its first fit.
+    /// Most machines have it, on every joint: such effects are tried together before all others, first those of rank 1,
+    /// then those up to rank 2, and so on. Effects of rank 1 are also added to a model before its first fit.
     pub baseline: Option<usize>,
 }
 
@@ -48,7 +49,7 @@ pub enum Entry {
     Torque(Formula),
     /// Replaces the joint's angle in the declared equations.
     Angle(Formula),
-    /// Added to the joint's own entry of the mass matrix.
+    /// Added to the joint's diagonal entry of the mass matrix.
     Inertia(Formula),
     /// Added to the declared parameter of this index.
     Shift(usize, Formula),
@@ -56,15 +57,16 @@ pub enum Entry {
     Command(CommandFilter),
     /// Replaces the measured angle.
     Reading(Formula),
-    /// A generalised force on the sum q + r q' of the joint's coordinate and the next joint's, r being the parameter of that
-    /// name: the joint feels it, and the next one r times. It may be linear in the acceleration of the sum, `qdd`.
+    /// A generalised force on the sum q + r q' of the joint's coordinate and the next joint's, r being the parameter of
+    /// that name: it acts on the joint, and r times on the next one. It may be linear in the acceleration of the sum,
+    /// `qdd`.
     Coupling(Formula),
-    /// A point of this mass on the last body of a chain, at the parameters x, y, z in the frame of that body.
+    /// A point mass on the last body of a chain, at the parameters x, y, z in that body's frame.
     Payload(Formula),
 }
 
 impl Entry {
-    /// The formula of the effect, or the filter that it is.
+    /// The effect's formula, or the filter if it is one.
     pub(super) fn formula_or_filter(&self) -> Result<&Formula, CommandFilter> {
         match self {
             Self::Force(f)
@@ -117,13 +119,13 @@ pub struct EffectParameter {
     pub typical: f64,
     /// Admissible range, in `measure`.
     pub bounds: [f64; 2],
-    /// Values from which fits start, in `measure`. A single one is the value without effect, mostly zero.
+    /// Values from which fits start, in `measure`. A single value is the one without effect, mostly zero.
     pub starts: Vec<f64>,
     /// Unit of bounds and starting values.
     pub measure: Measure,
     /// Whole numbers only: searched among the starting values, not fitted.
     pub whole: bool,
-    /// Takes a value of its own in each log.
+    /// Takes a separate value in each log.
     pub per_log: bool,
 }
 
@@ -133,8 +135,8 @@ impl Effect {
         matches!(self.entry, Entry::Coupling(_))
     }
 
-    /// The force of a coupling at rest in its acceleration, and the inertia of the sum, as a program of [`COUPLING_NAMES`] and the
-    /// parameters; `sign` is how dry friction reverses.
+    /// The force of a coupling at zero acceleration, and the inertia of the sum, as a program of [`COUPLING_NAMES`] and
+    /// the parameters; `sign` is how dry friction reverses.
     pub(super) fn coupling(&self, sign: SignForm) -> Option<Program> {
         let Entry::Coupling(formula) = &self.entry else {
             return None;
@@ -157,8 +159,8 @@ impl Effect {
         Some(graph.finish(&[at_rest, inertia]))
     }
 
-    /// The variable that the force of the effect depends on, where that is one of `q`, `qd`, `tau` and `t` alone, with the force
-    /// and its derivatives by the parameters as a program of the variable and the parameters.
+    /// The variable that the effect's force depends on, if that is one of `q`, `qd`, `tau` and `t` alone, with the
+    /// force and its derivatives with respect to the parameters as a program of the variable and the parameters.
     pub fn over_one_variable(&self) -> Option<(&'static str, Program)> {
         let (formula, replaced) = match &self.entry {
             Entry::Force(formula) => (formula, None),
@@ -233,7 +235,7 @@ impl Effect {
         self.valid_if.as_ref().is_none_or(condition)
     }
 
-    /// A formula in numbers, where `of_joint` gives its joint's `q`, `qd`, `tau` and so on.
+    /// The value of a formula, where `of_joint` gives its joint's `q`, `qd`, `tau` and so on.
     fn evaluate(&self, formula: &Formula, values: &[f64], of_joint: impl Fn(&str) -> f64) -> f64 {
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
@@ -252,7 +254,7 @@ impl Effect {
         graph.finish(&[node]).eval(&[])[0]
     }
 
-    /// What the sensor reads, by an effect of the sensor with these values, where the joint rests at `angle`.
+    /// The sensor's reading, under a sensor effect with these values, when the joint rests at `angle`.
     pub fn reading(&self, values: &[f64], angle: f64) -> f64 {
         let Entry::Angle(formula) = &self.entry else {
             return angle;
@@ -266,9 +268,9 @@ impl Effect {
         (0..16).fold(angle, |read, _| step(read))
     }
 
-    /// Whether the torque that acts tells which one was commanded, with typical values: it grows with the command everywhere.
+    /// Whether the acting torque determines the commanded one, at typical values: it grows with the command everywhere.
     /// A force that depends on the command may cancel it.
-    pub fn tells_command(&self) -> bool {
+    pub fn distinguishes_command(&self) -> bool {
         let formula = match &self.entry {
             Entry::Torque(formula) => formula,
             Entry::Force(formula) => return !formula.names().contains(&"tau"),
@@ -301,7 +303,7 @@ impl EffectParameter {
 mod tests {
     use crate::model::Library;
 
-    /// The variable of a built-in effect, and its force there with the derivatives by the parameters.
+    /// The variable of a built-in effect, and its force there with the derivatives with respect to the parameters.
     fn over(name: &str, inputs: &[f64]) -> Option<(&'static str, Vec<f64>)> {
         let library = Library::built_in();
         let effect = library.effect(name).unwrap();
@@ -313,7 +315,7 @@ mod tests {
     fn effects_of_one_variable_are_curves_over_it() {
         let dry = over("coulomb_friction", &[-2.0, 0.16]);
         assert_eq!(dry, Some(("qd", vec![0.16, 1.0])));
-        // What the drive gives beside what it was told to give.
+        // The torque that the drive gives beyond the commanded one.
         let gain = over("actuator_gain", &[3.0, 0.1]).unwrap();
         assert_eq!((gain.0, gain.1[1]), ("tau", 3.0));
         assert!((gain.1[0] - 0.3).abs() < 1e-12);

@@ -108,7 +108,7 @@ impl FromStr for Effect {
     }
 }
 
-/// The rank of what most machines have.
+/// The rank of a baseline effect.
 fn baseline(section: &Section<'_>) -> Result<Option<usize>, FileError> {
     match section.whole("baseline")? {
         Some(0) => Err(section.error_at(
@@ -153,7 +153,7 @@ fn entry(
     found.ok_or_else(|| section.error(format!("{ONE_WAY} is missing in [effect]")))
 }
 
-/// Parameters that a kind of effect has by their names: the share of the next joint, the place of a load.
+/// Parameters that a kind of effect needs by name: the share of the next joint, the position of a load.
 fn check_has(
     section: &Section<'_>,
     key: &str,

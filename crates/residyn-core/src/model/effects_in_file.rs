@@ -1,6 +1,6 @@
 //! The `[[effect]]` entries of a model file.
 
-use super::dynamics::OwnValue;
+use super::dynamics::PerLogValue;
 use super::effect::{Effect, EffectParameter};
 use super::fitted::{FittedEffect, Status};
 use super::reader::{FileError, Section};
@@ -41,7 +41,7 @@ fn fitted(
         .collect::<Result<_, _>>()?;
     let own = effect.parameters.iter().enumerate();
     let own = own
-        .map(|(k, p)| own_values(section, k, p))
+        .map(|(k, p)| per_log_values(section, k, p))
         .collect::<Result<Vec<_>, _>>()?;
     Ok(FittedEffect {
         effect: effect.clone(),
@@ -113,13 +113,12 @@ fn number_or_table(
     Ok((inner.required_number("value")?, interval(&inner, "ci95")?))
 }
 
-/// `q_z = { value = 0, logs = { "run1.csv" = { value = 0.012, ci95 = [0.011, 0.013] } } }`: what is known of
-/// single logs.
-fn own_values(
+/// `q_z = { value = 0, logs = { "run1.csv" = { value = 0.012, ci95 = [0.011, 0.013] } } }`: per-log values.
+fn per_log_values(
     section: &Section<'_>,
     k: usize,
     parameter: &EffectParameter,
-) -> Result<Vec<OwnValue>, FileError> {
+) -> Result<Vec<PerLogValue>, FileError> {
     if !section.is_table(&parameter.name) {
         return Ok(Vec::new());
     }
@@ -129,7 +128,7 @@ fn own_values(
     };
     let own = |log: &str| {
         let (value, ci95) = number_or_table(&logs, log, &["value", "ci95"])?;
-        Ok(OwnValue {
+        Ok(PerLogValue {
             log: log.to_owned(),
             parameter: k,
             value,

@@ -19,22 +19,22 @@ pub enum ModelError {
         /// A similar known name, as the end of a sentence; empty without one.
         near: String,
     },
-    /// The effect acts on a first joint that turns.
+    /// The effect acts only on a first joint that turns.
     #[error("`{effect}` acts on the first joint, where that turns")]
     FirstJointOnly { effect: String },
-    /// The effect acts on the last joint of a chain of bodies.
+    /// The effect acts only on the last joint of a chain of bodies.
     #[error("`{effect}` acts on the last joint of a chain of bodies")]
     LastJointOnly { effect: String },
-    /// The effect acts on two neighbouring joints of one kind.
+    /// The effect acts only on two neighbouring joints of one kind.
     #[error("`{effect}` acts on two joints in a row that both turn or both slide")]
     NeighboursOfOneKind { effect: String },
-    /// The effect is a part of the inertia, which the model does not state.
+    /// The effect is part of the inertia, which the model does not give.
     #[error("`{effect}` needs a model that gives `mass` and `bias`; {model} gives accelerations")]
     NeedsMass { effect: String, model: String },
-    /// The model has this effect, or one that excludes it, on the joint.
+    /// The model already has this effect, or one that excludes it, on the joint.
     #[error("`{effect}` acts on joint {joint} already")]
     Twice { effect: String, joint: Joint },
-    /// A parameter has a value outside of its bounds.
+    /// A parameter has a value outside its bounds.
     #[error("`{effect}`: {parameter} = {value} lies outside of {low} to {high}")]
     OutOfBounds {
         effect: String,

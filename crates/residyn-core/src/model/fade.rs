@@ -5,12 +5,12 @@ use nalgebra::{Cholesky, DMatrix};
 use super::network::{LayerWeights, MlpWeights};
 use super::residual::{nothing_but, with_residual};
 
-/// Features that others determine count as spread by this share of their own spread: sensors are not exact.
+/// A feature that the others determine keeps this share of its own spread: sensors are not exact.
 const LEAST_SPREAD: f64 = 0.1;
 
-/// The motion that a network was trained on, as the range of each whitened feature: what it has beyond the linear regression
-/// on the features before it, in units of that spread (the Cholesky factor of their covariance). A torque may so be unusual at
-/// its angle and speed that would be usual at others.
+/// The motion that a network was trained on, as the range of each whitened feature: its residual in the linear
+/// regression on the features before it, in units of that residual's spread (the Cholesky factor of their covariance).
+/// A torque can thus be unusual at one angle and speed and usual at others.
 struct Seen {
     /// `[whitened][feature]`, of scaled features.
     factors: DMatrix<f64>,
@@ -60,10 +60,10 @@ impl Seen {
 }
 
 impl MlpWeights {
-    /// The same network on the motion that it was trained on, `rows` of positions, velocities and torques, and nothing far
-    /// from it: its outputs are limited to their largest size there times max(0, 1 - d), where d is the distance from the range
-    /// of the whitened features, summed over them. It is again a network of ReLUs, three layers deep at least, so that
-    /// whatever evaluates networks evaluates this one:
+    /// The same network on the motion that it was trained on, `rows` of positions, velocities and torques, and zero far
+    /// from it: its outputs are limited to their largest magnitude there times max(0, 1 - d), where d is the distance
+    /// from the range of the whitened features, summed over them. It is again a ReLU network, at least three layers
+    /// deep, so that any code that evaluates networks evaluates this one:
     /// f limited to +-s is max(f + s, 0) - max(f - s, 0) - s, with the limit s = F max(0, 1 - d), and d is a sum of ReLUs.
     ///
     /// # Panics
@@ -109,9 +109,9 @@ impl MlpWeights {
         scaled.map(|(x, (mean, std))| (x - mean) / std).collect()
     }
 
-    /// The largest size of each output over rows.
+    /// The largest magnitude of each output over rows.
     fn largest(&self, rows: &[[Vec<f64>; 3]]) -> Vec<f64> {
-        // Nothing but the network enters the rates that it is added to.
+        // These rates contain nothing but the network.
         let around = nothing_but("", rows[0][0].len(), self.on);
         let whole = with_residual(&around, self).expect("a network for these joints");
         let mut largest = vec![0.0_f64; self.on.outputs(whole.joints)];
@@ -125,7 +125,7 @@ impl MlpWeights {
         largest
     }
 
-    /// With every number as it is in f32.
+    /// With every number rounded to f32.
     pub fn rounded(mut self) -> Self {
         for layer in &mut self.layers {
             for number in layer.weight.iter_mut().chain(&mut layer.bias) {
@@ -152,7 +152,7 @@ fn pass_on(layers: &mut Vec<LayerWeights>) {
     layers.push(LayerWeights::new(2 * size, weight.collect(), last.bias));
 }
 
-/// u_k - v_k - F_k g of all u, all v and g.
+/// u_k - v_k - F_k g from all u, all v and g.
 fn limited(largest: &[f64]) -> LayerWeights {
     let outputs = largest.len();
     let row = |(k, most): (usize, &f64)| {
@@ -174,7 +174,7 @@ impl LayerWeights {
         }
     }
 
-    /// The outputs of two layers of the same inputs, those of the other after its own.
+    /// Two layers with the same inputs combined into one, the other's outputs after its own.
     fn above(&self, other: &Self) -> Self {
         let join = |a: &[f64], b: &[f64]| [a, b].concat();
         Self::new(
@@ -184,7 +184,7 @@ impl LayerWeights {
         )
     }
 
-    /// Two layers of inputs of their own, those of the other after its own.
+    /// Two layers with separate inputs combined into one, the other's inputs and outputs after its own.
     fn beside(&self, other: &Self) -> Self {
         let rows = |layer: &Self, before: usize, after: usize| -> Vec<f64> {
             let pad = |row: &[f64]| [vec![0.0; before], row.to_vec(), vec![0.0; after]].concat();
@@ -251,12 +251,13 @@ mod tests {
                 largest = largest.max(own.abs());
             }
             assert!(largest > 0.1, "{largest}");
-            // Faster than ever seen, at another angle, and with a torque that is usual, but not there.
+            // Faster than in training, at another angle, and with a torque that is usual, but not at that angle and
+            // speed.
             for [q, qd, tau] in [[0.0, 9.0, 0.9], [2.5, 0.0, 5.0], [-0.9, 0.0, 1.8]] {
                 assert!(output(&network, q, qd, tau).abs() > 1e-3);
                 assert!(output(&fading, q, qd, tau).abs() < 1e-6);
             }
-            // On the way it is never larger than where it was trained.
+            // In between it is never larger than where it was trained.
             let sizes: Vec<f64> = (0..50)
                 .map(|k| output(&fading, 0.0, 4.0 + 0.1 * f64::from(k), 0.4).abs())
                 .collect();

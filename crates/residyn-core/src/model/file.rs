@@ -49,7 +49,7 @@ impl Model {
             name: section.required_text("name")?.value,
             about: section.text_or_empty("about")?,
             joints,
-            sign_width: sections::sign_width(&section, joints)?,
+            smoothing_velocity: sections::smoothing_velocity(&section, joints)?,
             columns: columns(top.section("columns")?, joints, driven_by, &joint_names)?,
             joint_names,
             parameters: sections::parameters(top.section("parameters")?)?,
@@ -103,12 +103,12 @@ impl Model {
         Ok(())
     }
 
-    /// Lower every formula once, so that a wrong name is met here, with its place.
+    /// Lower every formula once, so that a wrong name is reported here, with its place.
     fn check_formulas(&self, document: &Document) -> Result<(), FileError> {
         let mut graph = Graph::new();
         let mut names = self.input_names();
         if matches!(self.equations.motion, Motion::Chain(_)) {
-            // Bodies stay what they are while they move.
+            // The inertia of a body does not change as it moves.
             names.drain(..=3 * self.joints);
         }
         let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
@@ -121,7 +121,7 @@ impl Model {
         for (k, (name, formula)) in lets.iter().enumerate() {
             let mut later = lets[k..].iter().map(|(later, _)| later.as_str());
             if let Some(later) = later.find(|later| formula.value.names().contains(later)) {
-                let told = match circle(lets, name, later) {
+                let message = match circle(lets, name, later) {
                     Some(circle) => format!(
                         "`{name}` is defined by itself: {circle}; write one of these without the next"
                     ),
@@ -129,7 +129,7 @@ impl Model {
                         format!("`{name}` uses `{later}`, which is defined after it; move it up")
                     }
                 };
-                return Err(document.error(formula.at, told));
+                return Err(document.error(formula.at, message));
             }
             let node = lower(&scope, formula)?;
             scope.bind(name, node);
@@ -174,7 +174,7 @@ fn circle(lets: &[(String, Located<Formula>)], name: &str, next: &str) -> Option
     None
 }
 
-/// Equations of motion by formulas, or those of a chain of bodies.
+/// Equations of motion given by formulas, or those of a chain of bodies.
 fn motion(document: &Document, top: &Section<'_>, prismatic: &[bool]) -> Result<Motion, FileError> {
     let Some(chain) = top.section("chain")? else {
         let dynamics = top.required_section("dynamics")?;

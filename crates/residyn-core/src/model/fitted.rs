@@ -1,18 +1,18 @@
 //! Effects as part of a model.
 
 use super::Parameter;
-use super::dynamics::OwnValue;
+use super::dynamics::PerLogValue;
 use super::effect::{COUPLING_NAMES, EFFECT_NAMES, Effect, Entry, Measure, RATIO};
 use super::filter::CommandFilter;
 use crate::data::{Joint, Quantity};
 use crate::expr::{Graph, Program, Scope, SignForm};
 
-/// Whether an effect that was found may be relied on by its name.
+/// How far the name of an effect that was found can be relied on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// Significant among all candidates, and confirmed on stretches that its size was not fitted to.
+    /// Significant among all candidates, and confirmed on blocks that its size was not fitted to.
     Established,
-    /// Lowers the loss on stretches left out of the fit, but is not significant, or not confirmed.
+    /// Lowers the loss on blocks left out of the fit, but is not significant, or not confirmed.
     Supported,
 }
 
@@ -39,11 +39,11 @@ pub struct FittedEffect {
     pub joint: Joint,
     /// One for each of the effect's parameters: value and 95 % interval.
     pub values: Vec<(f64, Option<[f64; 2]>)>,
-    /// Values in single logs; in all other logs those of `values` hold.
-    pub own: Vec<OwnValue>,
+    /// Per-log values; in all other logs `values` hold.
+    pub own: Vec<PerLogValue>,
     /// Held at these values in every fit.
     pub fixed: bool,
-    /// How sure it is, where closing the loop found it.
+    /// How certain it is, if closing the loop found it.
     pub status: Option<Status>,
 }
 
@@ -69,13 +69,13 @@ impl FittedEffect {
         )
     }
 
-    /// Its joint as it is called, or `5 with 6` where it couples two.
+    /// The name of its joint, or `5 with 6` if it couples two.
     pub fn place(&self, called: impl Fn(Joint) -> String) -> String {
         let joints: Vec<String> = self.joints().into_iter().map(called).collect();
         joints.join(" with ")
     }
 
-    /// The joint that the effect acts on, and the next one where it couples the two.
+    /// The joint that the effect acts on, and the next one if it couples the two.
     pub fn joints(&self) -> Vec<Joint> {
         let next = self.effect.is_coupling().then(|| self.joint.next());
         [self.joint].into_iter().chain(next).collect()
@@ -108,7 +108,7 @@ impl FittedEffect {
         }
     }
 
-    /// The effect's formula as a program, or the filter that it is.
+    /// The effect's formula as a program, or the filter if it is one.
     pub(super) fn program(&self, names: &[String]) -> Result<Program, CommandFilter> {
         let formula = self.effect.entry.formula_or_filter()?;
         let mut graph = Graph::new();
@@ -140,7 +140,7 @@ impl FittedEffect {
         Ok(graph.finish(&[node]))
     }
 
-    /// The names of the effect's parameters on its joint, told apart from names already `taken`.
+    /// The names of the effect's parameters on its joint, distinct from names already `taken`.
     pub fn parameter_names(&self, taken: &[&str]) -> Vec<String> {
         let plain = |own: &str| match self.shifted() {
             Some(_) => format!("{own}_shift"),

@@ -11,7 +11,7 @@ use super::system::Model;
 
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../models");
 
-/// Read once: every command and every call of a library asks for it.
+/// Read once: every command and every library call asks for it.
 static EMBEDDED: LazyLock<Library> = LazyLock::new(|| Library {
     effects: embedded("effects", Effect::from_text).into(),
     probes: embedded("probes", Effect::from_text).into(),
@@ -61,7 +61,7 @@ impl Library {
         }
     }
 
-    /// Add an effect; it replaces the known one of its name.
+    /// Add an effect; it replaces a known one of the same name.
     #[must_use]
     pub fn with_effect(mut self, effect: Effect) -> Self {
         let known = self.effects.iter();

@@ -31,7 +31,7 @@ pub mod weights;
 mod written;
 
 pub use call::{Call, InputFile};
-pub use dynamics::{Dynamics, OwnValue, Parameter};
+pub use dynamics::{Dynamics, Parameter, PerLogValue};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
 pub use error::ModelError;
 pub use filter::{CommandFilter, Filter};

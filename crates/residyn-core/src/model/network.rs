@@ -20,7 +20,7 @@ pub enum Angles {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ResidualOn {
-    /// n outputs, on dqd/dt: what is missing is a force, and positions stay integrals of velocities.
+    /// n outputs, on dqd/dt: the missing part is a force, and positions stay integrals of velocities.
     #[default]
     Accelerations,
     /// 2n outputs, on dq/dt and dqd/dt: the form of the published method.
@@ -30,7 +30,7 @@ pub enum ResidualOn {
 /// How the last layer of a new network begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LastLayer {
-    /// All zero: a residual starts as nothing, and the model as its prior.
+    /// All zero: a residual starts at zero, and the model as its prior.
     Zero,
     /// Random like the others: for a network that is the whole model.
     Random,
@@ -52,7 +52,7 @@ pub struct MlpSettings {
 /// Check the widths of hidden layers.
 ///
 /// # Errors
-/// A width or a number of weights that no network here has, and what it may be.
+/// A width or a number of weights outside its range, and that range.
 pub(super) fn check_hidden(hidden: &[usize]) -> Result<(), String> {
     if hidden
         .iter()
@@ -78,7 +78,7 @@ fn hidden<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<usize>, D::Error> {
 }
 
 impl MlpSettings {
-    /// The published sizes: 16 neurons a layer, 3 layers for one joint, 4 for more.
+    /// The published sizes: 16 neurons per layer, 3 layers for one joint, 4 for more.
     pub fn for_joints(joints: usize) -> Self {
         Self {
             hidden: vec![16; if joints == 1 { 3 } else { 4 }],
@@ -120,7 +120,7 @@ impl ResidualOn {
     }
 }
 
-/// Mean and standard deviation by which each feature is brought to order one.
+/// Mean and standard deviation by which each feature is scaled to order one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InputScaling {
     pub mean: Vec<f64>,
@@ -128,7 +128,7 @@ pub struct InputScaling {
     pub std: Vec<f64>,
 }
 
-/// A network that is not one for a model's joints.
+/// A network that does not fit a model's joints.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "a network with layer widths {widths:?} does not fit {joints} joints: it must begin with \
@@ -168,7 +168,7 @@ impl InputScaling {
         }
         let std = (variance.iter().zip(&mean))
             .map(|(v, mean)| match v.sqrt() {
-                // Below this a spread is the rounding of the sums.
+                // A spread below this is rounding of the sums.
                 std if std > 1e-9 * (1.0 + mean.abs()) => std,
                 _ => 1.0,
             })
@@ -227,11 +227,11 @@ impl MlpWeights {
         }
     }
 
-    /// The same function with its features scaled otherwise, for data of another spread: the first layer takes up the
+    /// The same function with its features scaled differently, for data of another spread: the first layer absorbs the
     /// difference.
     ///
     /// # Panics
-    /// When `scaling` is of another number of features.
+    /// When `scaling` has another number of features.
     #[must_use]
     #[allow(clippy::cast_possible_truncation)] // every number is an f32
     pub fn rescaled(&self, scaling: InputScaling) -> Self {
@@ -268,7 +268,7 @@ impl MlpWeights {
     /// The same network with other weights and biases, in the order of [`MlpWeights::flat`].
     ///
     /// # Panics
-    /// When there are fewer than the network has.
+    /// When there are fewer numbers than the network has.
     #[must_use]
     pub fn with_flat(&self, flat: &[f64]) -> Self {
         let mut network = self.clone();

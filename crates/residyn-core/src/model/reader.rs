@@ -15,14 +15,14 @@ use crate::toml_text::check_size;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileError {
     pub path: PathBuf,
-    /// Line and column, counted from 1; `None` where the error concerns the whole file.
+    /// Line and column, counted from 1; `None` if the error concerns the whole file.
     pub place: Option<(usize, usize)>,
     pub message: String,
-    /// What the caller can give otherwise to mend it.
+    /// What the caller can give instead to fix it.
     pub remedy: Option<FileRemedy>,
 }
 
-/// What mends an error in a file besides the file itself.
+/// What fixes an error in a file, other than a change to the file itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileRemedy {
     /// Another last body of the chain that is read from a robot description.
@@ -39,9 +39,9 @@ impl FileError {
         }
     }
 
-    /// The same error, which this mends as well.
+    /// The same error, with this as a further remedy.
     #[must_use]
-    pub fn mended_by(self, remedy: FileRemedy) -> Self {
+    pub fn remedied_by(self, remedy: FileRemedy) -> Self {
         Self {
             remedy: Some(remedy),
             ..self
@@ -61,7 +61,7 @@ impl fmt::Display for FileError {
     }
 }
 
-/// A name alone, or a table that says more about what it names.
+/// A bare name, or a table that says more about what it names.
 pub(super) enum NameOrTable<'a> {
     Name(Located<String>),
     Table(Section<'a>),
@@ -71,7 +71,7 @@ pub(super) enum NameOrTable<'a> {
 pub(super) struct Document {
     pub path: PathBuf,
     pub text: String,
-    /// In the formulas that were read.
+    /// Number of terms in the formulas read so far.
     terms: Cell<usize>,
 }
 
@@ -131,7 +131,7 @@ impl Document {
     }
 }
 
-/// Above it numbers have gaps, 2^53.
+/// 2^53: above it, floating point skips whole numbers.
 const MOST_WHOLE: f64 = 9_007_199_254_740_992.0;
 
 type Value<'a> = Spanned<DeValue<'a>>;
@@ -146,7 +146,7 @@ pub(super) struct Section<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// The table `key`, if it is there.
+    /// The table `key`, if present.
     pub fn section(&self, key: &str) -> Result<Option<Section<'a>>, FileError> {
         self.optional(key, Self::table_of)
     }
@@ -157,7 +157,7 @@ impl<'a> Section<'a> {
             .ok_or_else(|| self.error(format!("the table [{key}] is missing")))
     }
 
-    /// The array of tables `key`, empty if it is not there.
+    /// The array of tables `key`, empty if absent.
     pub fn sections(&self, key: &str) -> Result<Vec<Section<'a>>, FileError> {
         let tables = self.list(key, "tables, written [[..]]", Self::table_of)?;
         Ok(tables.unwrap_or_default())
@@ -168,7 +168,7 @@ impl<'a> Section<'a> {
         self.table.keys().map(|key| key.get_ref().as_ref())
     }
 
-    /// Every key with the place of its value, bytes.
+    /// Every key with the byte offset of its value.
     pub fn places(&self) -> impl Iterator<Item = (&str, usize)> {
         let entries = self.table.iter();
         entries.map(|(key, value)| (key.get_ref().as_ref(), value.span().start))
@@ -224,7 +224,7 @@ impl<'a> Section<'a> {
         Ok(Some(number as usize))
     }
 
-    /// False if it is not there.
+    /// False if absent.
     pub fn flag(&self, key: &str) -> Result<bool, FileError> {
         self.get(key).map_or(Ok(false), |value| {
             value
@@ -362,7 +362,7 @@ impl<'a> Section<'a> {
         )
     }
 
-    /// What `of` reads from the value of `key`, if it is there.
+    /// What `of` reads from the value of `key`, if present.
     fn optional<T>(
         &self,
         key: &str,
@@ -383,7 +383,7 @@ impl<'a> Section<'a> {
             .collect()
     }
 
-    /// What `of` reads from each item of the list `key`, if it is there.
+    /// What `of` reads from each item of the list `key`, if present.
     fn list<T>(
         &self,
         key: &str,
@@ -462,7 +462,7 @@ impl<'a> Section<'a> {
         Err(self.document.error(value.span().start, message))
     }
 
-    /// A number, infinite where it limits nothing.
+    /// A number, infinite if it limits nothing.
     fn limit_of(&self, key: &str, value: &Value<'a>) -> Result<f64, FileError> {
         match self.float_of(key, value)? {
             number if number.is_nan() => Err(self.wrong(value, key, "a decimal number")),

@@ -11,7 +11,7 @@ use super::sections;
 use crate::data::{Joint, Quantity};
 use crate::expr::{Formula, Graph, Scope, SignForm, suggestion};
 
-/// What formulas of a drive file may mention of their joint besides the parameters.
+/// Quantities of its joint that a drive file's formulas may mention besides the parameters.
 const NAMES: [&str; 4] = ["q", "qd", Quantity::Command.key(), "t"];
 
 /// A drive of one joint: one file of `models/drives`.
@@ -88,7 +88,7 @@ impl ReadyDrive {
         self.parameters.iter().any(|(name, _)| name == parameter)
     }
 
-    /// Write the drive of a joint into a model file, with these values of its parameters where they are known.
+    /// Write a joint's drive into a model file, with the known values of its parameters.
     pub(super) fn write_into(
         &self,
         model: &mut DocumentMut,
@@ -110,7 +110,7 @@ impl ReadyDrive {
         }
     }
 
-    /// The torque in the names of a joint.
+    /// The torque in the variable names of a joint.
     fn formula(&self, joint: Joint) -> String {
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);

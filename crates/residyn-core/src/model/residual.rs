@@ -8,7 +8,7 @@ impl MlpWeights {
     /// Write the network into a graph as operations; ReLU is `max(x, 0)`. Returns its outputs.
     ///
     /// # Panics
-    /// When the network is not one for `q.len()` joints, see [`MlpWeights::check`].
+    /// When the network does not fit `q.len()` joints, see [`MlpWeights::check`].
     pub fn write(&self, graph: &mut Graph, q: &[Node], qd: &[Node], tau: &[Node]) -> Vec<Node> {
         let zero = graph.constant(0.0);
         let mut values = self.features(graph, q, qd, tau);
@@ -65,7 +65,7 @@ impl LayerWeights {
 /// The same model with a network's outputs added to its derivative, again as one program.
 ///
 /// # Errors
-/// When the network is not one for the joints of `dynamics`.
+/// When the network does not fit the joints of `dynamics`.
 pub fn with_residual(dynamics: &Dynamics, mlp: &MlpWeights) -> Result<Dynamics, NetworkError> {
     let n = dynamics.joints;
     mlp.check(n)?;
@@ -90,8 +90,7 @@ pub fn with_residual(dynamics: &Dynamics, mlp: &MlpWeights) -> Result<Dynamics, 
     })
 }
 
-/// The rates that a network is added to where there are no equations: none, or dq/dt = qd where it gives
-/// accelerations alone.
+/// The rates that a network is added to if there are no equations: zero, or dq/dt = qd if it gives accelerations alone.
 pub fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics {
     let mut graph = Graph::new();
     let numbered = |stem: &'static str| (1..=joints).map(move |joint| format!("{stem}{joint}"));

@@ -22,20 +22,20 @@ pub struct ModelShape {
     /// Name of the system.
     pub system: String,
     pub joints: usize,
-    /// Empty where the prior is a network.
+    /// Empty if the prior is a network.
     pub parameters: Vec<SavedParameter>,
-    /// The prior, where it is a network.
+    /// The prior, if it is a network.
     pub prior: Option<SavedNetwork>,
     pub residual: Option<SavedNetwork>,
 }
 
-/// What training needs to know of a physical parameter, besides its value.
+/// What training needs to know about a physical parameter, besides its value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SavedParameter {
     pub name: String,
     pub unit: String,
     pub scale: f64,
-    /// None where there is no bound: JSON has no infinity.
+    /// None if there is no bound: JSON has no infinity.
     pub bounds: [Option<f64>; 2],
     pub fixed: bool,
 }
@@ -50,7 +50,7 @@ pub struct SavedNetwork {
     pub scaling: InputScaling,
 }
 
-/// Where a model came from: kept beside it, so that its files explain themselves.
+/// Where a model came from: kept with it, so that its files explain themselves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Origin {
     /// The whole configuration, as resolved.
@@ -58,12 +58,12 @@ pub struct Origin {
     pub seed: u64,
     /// Text of the model file.
     pub model_toml: String,
-    /// Of a report: how the program was called. None where a program calls the library.
+    /// For a report: how the program was called. None if a program calls the library.
     pub call: Option<Call>,
 }
 
 impl Origin {
-    /// A program that calls the library, and the seed of its random numbers.
+    /// The origin of a model in a program that calls the library, with the seed of its random numbers.
     pub fn of_seed(seed: u64) -> Self {
         Self {
             config: serde_json::json!({"command": null}),

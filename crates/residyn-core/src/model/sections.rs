@@ -17,7 +17,7 @@ pub(super) const SYSTEM_KEYS: &[&str] = &[
     "joints",
     "joint_names",
     "prismatic",
-    "sign_width",
+    "smoothing_velocity",
 ];
 const PARAMETER_KEYS: &[&str] = &[
     "value", "unit", "about", "positive", "bounds", "fixed", "ci95",
@@ -34,7 +34,7 @@ pub(super) fn joints(section: &Section<'_>) -> Result<usize, FileError> {
     }
 }
 
-/// One name a joint, all different; without them an empty list.
+/// One name per joint, all different; an empty list if not given.
 pub(super) fn joint_names(section: &Section<'_>, joints: usize) -> Result<Vec<String>, FileError> {
     let Some(names) = section.texts("joint_names")? else {
         return Ok(Vec::new());
@@ -59,17 +59,18 @@ pub(super) fn prismatic(section: &Section<'_>, joints: usize) -> Result<Vec<bool
     Ok(numbers.iter().map(|j| listed.contains(j)).collect())
 }
 
-/// One width above zero a joint.
-pub(super) fn sign_width(
+/// One width per joint, above zero.
+pub(super) fn smoothing_velocity(
     section: &Section<'_>,
     joints: usize,
 ) -> Result<Option<Vec<f64>>, FileError> {
-    let widths = section.numbers("sign_width")?;
+    let widths = section.numbers("smoothing_velocity")?;
     match &widths {
         Some(widths) if widths.len() != joints || widths.iter().any(|w| *w <= 0.0) => {
-            let message =
-                format!("`sign_width` is a list of {joints} speeds above zero, one a joint");
-            Err(section.error_at("sign_width", message))
+            let message = format!(
+                "`smoothing_velocity` is a list of {joints} speeds above zero, one a joint"
+            );
+            Err(section.error_at("smoothing_velocity", message))
         }
         _ => Ok(widths),
     }
@@ -110,7 +111,7 @@ fn parameter(name: String, section: &Section<'_>) -> Result<Parameter, FileError
     Ok(parameter.with_value(value))
 }
 
-/// A list of two numbers, where it is given.
+/// A list of two numbers, if given.
 pub(super) fn interval(section: &Section<'_>, key: &str) -> Result<Option<[f64; 2]>, FileError> {
     match section.limits(key)? {
         None => Ok(None),
@@ -121,7 +122,7 @@ pub(super) fn interval(section: &Section<'_>, key: &str) -> Result<Option<[f64; 
     }
 }
 
-/// Widths of the hidden layers of the residual network; the published ones where the file gives none.
+/// Widths of the hidden layers of the residual network; the published ones if the file gives none.
 pub(super) fn hidden(section: Option<Section<'_>>, joints: usize) -> Result<Vec<usize>, FileError> {
     let default = MlpSettings::for_joints(joints).hidden;
     let Some(section) = section else {
@@ -131,7 +132,7 @@ pub(super) fn hidden(section: Option<Section<'_>>, joints: usize) -> Result<Vec<
     let Some(numbers) = section.numbers("hidden")? else {
         return Ok(default);
     };
-    // What is no whole number becomes 0, which is no width.
+    // A number that is not whole becomes 0, which is not a valid width.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let width = |number: f64| {
         if number.fract() == 0.0 {
@@ -218,7 +219,7 @@ pub(super) fn energy(section: Option<Section<'_>>) -> Result<Option<Energy>, Fil
     Ok(Some(Energy { total, power }))
 }
 
-/// A file that was read without its effects, wherever they stand.
+/// The text of a file without its effects, wherever they stand.
 pub(super) fn declaration(document: &Document) -> Result<String, FileError> {
     let mut parsed: DocumentMut = document.text.parse().map_err(|error: TomlError| {
         let at = error.span().map_or(0, |span| span.start);

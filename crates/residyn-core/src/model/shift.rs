@@ -16,8 +16,8 @@ const UNIT_OF_GRAVITY: &str = "m/s^2";
 const LEAST: f64 = 1e-3;
 
 impl Model {
-    /// For each parameter that the file declares fixed, the effect that it has another value: on the outermost
-    /// joint whose equation it enters, still absent.
+    /// For each parameter that the file declares fixed, the effect that gives it another value: on the outermost joint
+    /// whose equation it enters, still at zero.
     pub fn shifts(&self) -> Vec<FittedEffect> {
         let fixed = |p: &&Parameter| p.fixed && p.unit != UNIT_OF_GRAVITY;
         let all = self.parameters.iter().enumerate();
@@ -95,7 +95,7 @@ fn shift(k: usize, declared: &Parameter) -> Effect {
 }
 
 impl FittedEffect {
-    /// The declared parameter that the effect shifts, if it is one of that kind.
+    /// The declared parameter that the effect shifts, if it is a shift.
     pub fn shifted(&self) -> Option<usize> {
         match self.effect.entry {
             Entry::Shift(k, _) => Some(k),
@@ -103,7 +103,7 @@ impl FittedEffect {
         }
     }
 
-    /// The effect's name, with that of the parameter that it shifts.
+    /// The effect's name, with the name of the parameter that it shifts.
     pub fn title(&self) -> String {
         match self.shifted() {
             Some(_) => format!("{NAME} of {}", self.effect.parameters[0].name),
@@ -129,7 +129,7 @@ impl Model {
 }
 
 impl Parameter {
-    /// A declared parameter whose fitted `shift` stands beside it: with its actual value.
+    /// A declared parameter with its actual value, given its fitted `shift`.
     #[must_use]
     pub fn shifted_by(&self, shift: &Self) -> Self {
         let moved = |[low, high]: [f64; 2]| [self.value + low, self.value + high];

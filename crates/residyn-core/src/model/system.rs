@@ -4,7 +4,7 @@ use std::sync::Arc;
 use super::bodies::Bodies;
 use super::chain::{Body, Recovered};
 use super::drive::Drive;
-use super::dynamics::{Dynamics, OwnValue, Parameter};
+use super::dynamics::{Dynamics, Parameter, PerLogValue};
 use super::effect::{Effect, Entry, Measure};
 use super::error::ModelError;
 use super::fitted::FittedEffect;
@@ -13,19 +13,19 @@ use crate::data::{Columns, Joint, Log, LogError};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
 /// Speed over which dry friction reverses (rad/s or m/s), unless the file or a fit to logs sets another one.
-const DEFAULT_SIGN_WIDTH: f64 = 0.01;
+const DEFAULT_SMOOTHING_VELOCITY: f64 = 0.01;
 
 /// How a model file states the motion.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Motion {
-    /// qdd = ..., one formula a joint.
+    /// qdd = ..., one formula per joint.
     Accelerations(Vec<Located<Formula>>),
     /// mass(q) qdd + bias(q, qd) = tau.
     MassAndBias {
         mass: Vec<Vec<Located<Formula>>>,
         bias: Vec<Located<Formula>>,
     },
-    /// The same, of a chain of bodies.
+    /// The same, for a chain of bodies.
     Chain(Box<Bodies>),
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Equations {
     pub lets: Vec<(String, Located<Formula>)>,
     pub motion: Motion,
     pub energy: Option<Energy>,
-    /// What makes the torques, where commands do.
+    /// What turns commands into torques, if commands drive the rig.
     pub drive: Option<Drive>,
 }
 
@@ -55,13 +55,13 @@ pub struct Model {
     pub name: String,
     pub about: String,
     pub joints: usize,
-    /// As a URDF or the rig calls the joints; empty where they have numbers alone.
+    /// Names of the joints in a URDF or on the rig; empty if they have only numbers.
     pub joint_names: Vec<String>,
-    /// For each joint whether it slides (m, N) rather than turns (rad, N m).
+    /// For each joint, whether it slides (m, N) rather than turns (rad, N m).
     pub prismatic: Vec<bool>,
     /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump. `None` if the file sets none:
-    /// then fits choose it by the speeds in the logs.
-    pub sign_width: Option<Vec<f64>>,
+    /// fits then choose it from the speeds in the logs.
+    pub smoothing_velocity: Option<Vec<f64>>,
     pub columns: Columns,
     pub parameters: Vec<Parameter>,
     pub effects: Vec<FittedEffect>,
@@ -75,7 +75,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// The log that a file with these columns, in memory, is; `name` is for messages and for the report.
+    /// The log with these columns in memory; `name` is for messages and the report.
     ///
     /// # Errors
     /// Columns that lack a name or a number.
@@ -87,13 +87,13 @@ impl Model {
         Log::from_columns(name, columns, Some((self.joints, &self.columns)))
     }
 
-    /// Names that effects must not take: of parameters and of intermediates.
+    /// Names that effects must not take: those of parameters and intermediates.
     pub(super) fn own_names(&self) -> impl Iterator<Item = &str> {
         let lets = self.equations.lets.iter().map(|(name, _)| name.as_str());
         self.parameters.iter().map(|p| p.name.as_str()).chain(lets)
     }
 
-    /// A joint for people: `2`, or `2 (elbow)` where it has a name.
+    /// A joint's label for users: `2`, or `2 (elbow)` if it has a name.
     pub fn joint_label(&self, joint: Joint) -> String {
         joint.called(self.joint_names.get(joint.index()).map(String::as_str))
     }
@@ -112,9 +112,9 @@ impl Model {
     }
 
     /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump.
-    pub fn sign_widths(&self) -> Vec<f64> {
-        let default = || vec![DEFAULT_SIGN_WIDTH; self.joints];
-        self.sign_width.clone().unwrap_or_else(default)
+    pub fn smoothing_velocities(&self) -> Vec<f64> {
+        let default = || vec![DEFAULT_SMOOTHING_VELOCITY; self.joints];
+        self.smoothing_velocity.clone().unwrap_or_else(default)
     }
 
     /// How dry friction is written in each joint.
@@ -123,7 +123,7 @@ impl Model {
             0.0 => SignForm::Exact,
             width => SignForm::Smooth { width },
         };
-        self.sign_widths().into_iter().map(form).collect()
+        self.smoothing_velocities().into_iter().map(form).collect()
     }
 
     /// The same model with these effects in place of its own.
@@ -138,12 +138,12 @@ impl Model {
     /// The same model with dry friction that reverses over these speeds (rad/s or m/s), one per joint; 0 for a jump.
     ///
     /// # Panics
-    /// When there is not one width a joint.
+    /// When there is not one width per joint.
     #[must_use]
-    pub fn with_sign_widths(&self, widths: Vec<f64>) -> Self {
+    pub fn with_smoothing_velocities(&self, widths: Vec<f64>) -> Self {
         assert_eq!(widths.len(), self.joints, "one width for each joint");
         Self {
-            sign_width: Some(widths),
+            smoothing_velocity: Some(widths),
             ..self.clone()
         }
     }
@@ -157,17 +157,17 @@ impl Model {
             .collect()
     }
 
-    /// The value of a parameter, by its index among all; in a log, the one that it has there.
+    /// The value of a parameter, by its index among all; with a log, its value there.
     pub fn value_of(&self, parameter: usize, log: Option<&Log>) -> f64 {
-        let in_log = |own: &OwnValue| log.is_some_and(|log| log.is_called(&own.log));
-        let own = self.own_values().into_iter();
+        let in_log = |own: &PerLogValue| log.is_some_and(|log| log.is_called(&own.log));
+        let own = self.per_log_values().into_iter();
         let mut own = own.filter(|own| own.parameter == parameter);
         own.find(in_log)
             .map_or_else(|| self.values()[parameter], |own| own.value)
     }
 
-    /// The same model with the values of a compiled form of it, those in single logs included. Intervals are dropped,
-    /// since they belong to other values.
+    /// The same model with the values of its compiled form, per-log values included. Intervals are dropped, since they
+    /// belong to other values.
     ///
     /// # Panics
     /// If `compiled` has another number of parameters.
@@ -185,18 +185,22 @@ impl Model {
         }
         for k in 0..model.effects.len() {
             let place = self.place_of(k);
-            let of_effect = |own: &&OwnValue| place.contains(&own.parameter);
-            let own = compiled.own.iter().filter(of_effect).map(|own| OwnValue {
-                parameter: own.parameter - place.start,
-                ..own.clone()
-            });
+            let of_effect = |own: &&PerLogValue| place.contains(&own.parameter);
+            let own = compiled
+                .own
+                .iter()
+                .filter(of_effect)
+                .map(|own| PerLogValue {
+                    parameter: own.parameter - place.start,
+                    ..own.clone()
+                });
             model.effects[k].own = own.collect();
         }
         model
     }
 
-    /// Set the interval of a parameter's value, or of its value in one log, by its half width; the parameter's bounds cut
-    /// it.
+    /// Set the interval of a parameter's value, or of its value in one log, by its half width; it is clipped to the
+    /// parameter's bounds.
     pub fn set_half_width(&mut self, parameter: usize, log: Option<&Log>, half: f64) {
         let [low, high] = self.all_parameters()[parameter].bounds;
         let around = |value: f64| Some([(value - half).max(low), (value + half).min(high)]);
@@ -212,7 +216,7 @@ impl Model {
         let first = self.place_of(k).start;
         let mut own = self.effects[k].own.iter_mut();
         let is_it =
-            |own: &&mut OwnValue| own.parameter == parameter - first && log.is_called(&own.log);
+            |own: &&mut PerLogValue| own.parameter == parameter - first && log.is_called(&own.log);
         if let Some(own) = own.find(is_it) {
             own.ci95 = around(own.value);
         }
@@ -319,13 +323,13 @@ impl Model {
         Ok(())
     }
 
-    /// Whether the file gives mass matrix and bias, which effects of the inertia need.
+    /// Whether the file gives mass matrix and bias, which effects on the inertia need.
     pub fn has_mass_matrix(&self) -> bool {
         !matches!(self.equations.motion, Motion::Accelerations(_))
     }
 
-    /// Total energy and the power of the torques as a program of the inputs of a compiled model, where the file
-    /// states them or its equations are those of a chain: `[total, power, d total/dq.., d total/dqd..]`.
+    /// Total energy and the power of the torques as a program of the inputs of a compiled model, if the file states
+    /// them or its equations are those of a chain: `[total, power, d total/dq.., d total/dqd..]`.
     pub fn energy_program(&self) -> Option<crate::expr::Program> {
         let mut graph = Graph::new();
         let names = match self.equations.drive {
@@ -362,8 +366,8 @@ impl Model {
 }
 
 impl Model {
-    /// The parameters of each body of a chain whose ten parts are parameters as they are: mass, first moments, and xx, xy, xz,
-    /// yy, yz, zz of the tensor.
+    /// The parameters of each body of a chain whose ten parts are plain parameters: mass, first moments, and xx, xy,
+    /// xz, yy, yz, zz of the tensor.
     pub fn inertias(&self) -> Vec<[usize; 10]> {
         let Motion::Chain(bodies) = &self.equations.motion else {
             return Vec::new();
@@ -379,7 +383,7 @@ impl Model {
         bodies.bodies.iter().filter_map(body).collect()
     }
 
-    /// The bodies that the file describes, where it describes a chain, at other values of the declared parameters.
+    /// The bodies that the file describes, if it describes a chain, at these values of the declared parameters.
     pub fn mechanism(&self, values: &[f64]) -> Option<Recovered> {
         let Motion::Chain(bodies) = &self.equations.motion else {
             return None;

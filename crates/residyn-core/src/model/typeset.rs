@@ -57,7 +57,7 @@ impl Model {
 }
 
 impl Model {
-    /// The torques of the drives, where there are any.
+    /// The drives' torques, if there are any drives.
     fn drive_lines(&self) -> Vec<String> {
         let names = self.drive_names();
         let drives = self.equations.drive.iter().flat_map(Drive::formulas);

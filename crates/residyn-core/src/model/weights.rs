@@ -20,7 +20,7 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    /// Of f32.
+    /// A tensor of f32.
     pub(crate) fn of_f32(name: String, shape: Vec<usize>, values: &[f32]) -> Self {
         Self {
             name,
@@ -175,7 +175,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The bytes in groups of `N`, which safetensors has checked to come out even.
+/// The bytes in groups of `N`; safetensors has checked that they come out even.
 fn chunks<const N: usize>(bytes: &[u8]) -> impl Iterator<Item = [u8; N]> {
     bytes.as_chunks::<N>().0.iter().copied()
 }

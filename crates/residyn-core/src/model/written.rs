@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
-use super::dynamics::OwnValue;
+use super::dynamics::PerLogValue;
 use super::fitted::FittedEffect;
 use super::system::Model;
 
 impl Model {
-    /// The model as a model file. What the user declared stays as it is, comments included; only numbers of
+    /// The model as a model file. The user's declarations stay as they are, comments included; only the numbers of
     /// `[parameters]` and the smoothing of friction change. The effects follow.
     pub fn file_text(&self) -> String {
         let mut text = self.declaration_with_values();
@@ -51,16 +51,16 @@ impl Model {
                 }
             }
         }
-        // Predictions are only the same again with the same smoothing of dry friction.
-        if let Some(widths) = &self.sign_width {
+        // Predictions are only reproduced with the same smoothing of dry friction.
+        if let Some(widths) = &self.smoothing_velocity {
             let widths: toml_edit::Array = widths.iter().copied().collect();
-            document["system"]["sign_width"] = toml_edit::value(widths);
+            document["system"]["smoothing_velocity"] = toml_edit::value(widths);
         }
         document.to_string()
     }
 }
 
-/// `joint = 1`, or `joints = [5, 6]` of an effect that couples two.
+/// `joint = 1`, or `joints = [5, 6]` for an effect that couples two.
 fn place(effect: &FittedEffect) -> String {
     match effect.joints()[..] {
         [joint, next] => format!("joints = [{joint}, {next}]"),
@@ -73,13 +73,13 @@ fn value_and_interval(value: f64, ci95: Option<[f64; 2]>) -> String {
     format!("value = {value:?}{}", interval.unwrap_or_default())
 }
 
-/// Values in single logs, each named by its file name, or by its path where file names are equal.
+/// Per-log values, each under its log's file name, or under its path if file names are equal.
 fn of_logs(effect: &FittedEffect, k: usize) -> String {
-    let own: Vec<&OwnValue> = effect.own.iter().filter(|own| own.parameter == k).collect();
+    let own: Vec<&PerLogValue> = effect.own.iter().filter(|own| own.parameter == k).collect();
     if own.is_empty() {
         return String::new();
     }
-    let entry = |of: &&OwnValue| {
+    let entry = |of: &&PerLogValue| {
         let alone = own
             .iter()
             .filter(|other| other.log_name() == of.log_name())

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Excitation {
-    /// Size per joint, of a torque in N m (or N): each of k sines has this amplitude divided by the root of k.
+    /// Size per joint, for a torque in N m (or N): each of k sines has this amplitude divided by the root of k.
     pub amplitude: Vec<f64>,
     /// Lowest and highest frequency in Hz.
     pub band_hz: [f64; 2],

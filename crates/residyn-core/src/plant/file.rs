@@ -142,7 +142,7 @@ impl Plant {
         BUILT_IN.get_file(format!("{name}.toml"))?.contents_utf8()
     }
 
-    /// The plant in `text`, whose `model` is asked for by what the text calls it; `path` is for messages.
+    /// The plant in `text`; `model` returns the model that the text names; `path` is for messages.
     ///
     /// # Errors
     /// Unknown key, parameter or effect; messages name place and remedy.
@@ -168,7 +168,7 @@ impl Plant {
         Ok(plant)
     }
 
-    /// Whether a text is that of a plant, not of a model.
+    /// Whether a text describes a plant rather than a model.
     pub fn is_one(text: &str) -> bool {
         from_toml::<toml::Table>(text).is_ok_and(|table| table.contains_key("model"))
     }
@@ -242,10 +242,10 @@ impl Plant {
         Ok(())
     }
 
-    /// The same plant, recorded for so long \[s\].
+    /// The same plant, recorded for `duration_s`.
     ///
     /// # Errors
-    /// A time that has less than two rows, or more than any log.
+    /// A duration with fewer than two rows, or with more than any log has.
     pub fn lasting(mut self, duration_s: f64) -> Result<Self, PlantError> {
         self.recording.duration_s = duration_s;
         self.check().map_err(PlantError::Sampling)?;

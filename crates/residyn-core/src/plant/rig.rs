@@ -10,7 +10,7 @@ use crate::sim::{Environment, Integrator};
 
 /// A plant under control: a torque is held for a step, then the state is measured.
 ///
-/// Its integrator may be far finer than that of the model which the planner uses.
+/// Its integrator may be far finer than that of the planner's model.
 pub struct Rig<'d> {
     environment: Environment<'d>,
     noise: Noise,
@@ -35,7 +35,7 @@ impl<'d> Rig<'d> {
     /// A plant from `start` (positions, then velocities) in steps of `step_s` seconds.
     ///
     /// # Panics
-    /// When `start` is not of the plant's size.
+    /// When `start` does not have the plant's size.
     pub fn new(
         dynamics: &'d Dynamics,
         start: &[f64],
@@ -60,7 +60,7 @@ impl<'d> Rig<'d> {
         &self.state
     }
 
-    /// A log of this plant, without a row.
+    /// A log of this plant, still without rows.
     pub fn empty_log(&self) -> Log {
         Log {
             driven_by: self.driven_by,

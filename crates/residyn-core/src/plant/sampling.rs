@@ -15,11 +15,11 @@ pub struct Sampling {
     pub length: usize,
     pub step_s: f64,
     pub integrator: Integrator,
-    /// Ranges of the start, one a joint, in rad (or m).
+    /// Ranges of the start, one per joint, in rad (or m).
     pub position: Vec<[f64; 2]>,
-    /// The same for velocities.
+    /// As above, for velocities.
     pub velocity: Vec<[f64; 2]>,
-    /// The same for torques, in N m (or N).
+    /// As above, for torques, in N m (or N).
     #[serde(alias = "command")]
     pub torque: Vec<[f64; 2]>,
     pub starts: Starts,
@@ -49,7 +49,7 @@ impl Plant {
     /// Draw random trajectories.
     ///
     /// # Errors
-    /// Ranges that do not suit the plant's joints, or a plant that diverges.
+    /// Ranges that do not match the plant's joints, or a plant that diverges.
     pub fn sample(
         &self,
         sampling: &Sampling,
@@ -130,7 +130,7 @@ impl Sampling {
         draws
     }
 
-    /// The time at which it is no longer finite as an error \[s\].
+    /// The error is the time at which the state is no longer finite \[s\].
     fn run(&self, draw: Draw, environment: &mut Environment) -> Result<Trajectory, f64> {
         let joints = draw.position.len();
         let mut state = [draw.position, draw.velocity].concat();
@@ -165,7 +165,7 @@ impl Draw {
     }
 }
 
-/// Refuse what is no length of a step \[s\].
+/// Refuse an invalid step length \[s\].
 pub fn check_step(step_s: f64) -> Result<(), String> {
     match step_s > 0.0 && step_s <= LOG_TIME {
         true => Ok(()),

@@ -18,7 +18,7 @@ impl Plant {
         for (parameter, value) in model.parameters.iter_mut().zip(&self.parameters) {
             parameter.value = *value;
         }
-        model.with_sign_widths(vec![SIGN_WIDTH; model.joints])
+        model.with_smoothing_velocities(vec![SIGN_WIDTH; model.joints])
     }
 
     /// The true equations of motion, with their true values.
@@ -62,7 +62,7 @@ impl Plant {
         Ok(log)
     }
 
-    /// Why the rig left the finite numbers at a time \[s\].
+    /// Why the rig diverged at a time \[s\].
     pub(super) fn diverged(&self, time_s: f64) -> PlantError {
         match self.model().mass_fault() {
             Some(fault) => PlantError::Mass { time_s, fault },
@@ -113,7 +113,7 @@ impl Plant {
     }
 }
 
-/// `[joint][row]` of `[row][joint]`
+/// `[joint][row]` from `[row][joint]`
 fn by_joint(rows: &[Vec<f64>], joints: usize) -> Vec<Vec<f64>> {
     (0..joints)
         .map(|j| rows.iter().map(|row| row[j]).collect())

@@ -7,7 +7,7 @@ use crate::model::{CommandFilter, Filter};
 
 /// A history of commanded torques, filtered by the delays and lags of a model.
 ///
-/// Each command is held until the next row; the first one held for ever before, the last one holds for ever after. The
+/// Each command is held until the next row; the first counts as held for ever before, the last for ever after. The
 /// filters are linear, so the order of a delay and a lag on one joint does not matter.
 #[derive(Debug, Clone)]
 pub struct Commands<'l> {
@@ -16,11 +16,11 @@ pub struct Commands<'l> {
     joints: usize,
     /// The model's filters, in the order of [`StepTorque::slopes`].
     filters: Vec<Filter>,
-    /// Per joint the filtered history, if the joint has a filter.
+    /// The filtered history of each joint, if the joint has a filter.
     histories: Vec<Option<History<'l>>>,
 }
 
-/// Mean torques that the drive of a joint delivers from each row of a log to the next.
+/// Mean torques that a joint's drive delivers from each row of a log to the next.
 pub struct Delivered {
     /// N m (or N).
     pub tau: Vec<f64>,
@@ -294,7 +294,8 @@ impl<'l> History<'l> {
         self.after(time - self.time[0])
     }
 
-    /// Just before so many seconds after the first row. Differences of times keep the digits that large times lack.
+    /// The instant just before `since` seconds after the first row. Time differences keep the digits that large times
+    /// lose.
     fn after(&self, since: f64) -> Instant {
         let time = since - self.delay;
         let since = |row: usize| self.time[row] - self.time[0];

@@ -1,9 +1,9 @@
 use super::{Commands, Hold, Integrator, Point, Simulator};
 use crate::lanes::Row;
 
-/// A model that is stepped as a controlled environment is: a fixed step under a held torque, in f64.
+/// A model stepped like a controlled environment: a fixed step under a held torque, in f64.
 ///
-/// A model whose torques are filtered remembers those of all steps since its beginning, before which they were zero.
+/// A model with torque filters remembers the torques of all steps since its start; before that they were zero.
 pub struct Environment<'d> {
     model: Point<'d>,
     simulator: Simulator<'d, 1>,
@@ -37,7 +37,7 @@ impl<'d> Environment<'d> {
     /// Advance `state` (positions, then velocities) by one step from `time_s` under the torque `tau`.
     ///
     /// # Panics
-    /// When `state` or `tau` is not of the model's size.
+    /// When `state` or `tau` does not have the model's size.
     pub fn step(&mut self, state: &mut [f64], tau: &[f64], time_s: f64) {
         if !self.model.dynamics.filters.is_empty() {
             self.past.push(tau, time_s, self.step_s);
@@ -64,7 +64,7 @@ impl<'d> Environment<'d> {
         shown.iter().map(|Row([angle])| *angle).collect()
     }
 
-    /// The torque of each joint that acted at the end of the last step, 0 before the first.
+    /// The torque that acted on each joint at the end of the last step; 0 before the first.
     pub fn acting(&self) -> Vec<f64> {
         let acting = self.simulator.acting();
         acting.into_iter().map(|Row([tau])| tau).collect()

@@ -19,7 +19,7 @@ pub struct Integrator {
     substeps: NonZeroU32,
 }
 
-/// What is no integrator.
+/// Why an integrator is refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum IntegratorError {
     /// No scheme has this name.
@@ -28,7 +28,7 @@ pub enum IntegratorError {
         names()
     )]
     Unknown { name: String },
-    /// More substeps than are taken.
+    /// More substeps than the limit.
     #[error("a step is integrated in at most {SUBSTEPS} substeps, found {found}")]
     TooManySubsteps { found: NonZeroU32 },
 }
@@ -61,7 +61,7 @@ impl Integrator {
         self.scheme
     }
 
-    /// The equal parts of a step that are integrated one after the other.
+    /// Number of equal parts of a step, integrated one after the other.
     pub const fn substeps(self) -> usize {
         self.substeps.get() as usize
     }
@@ -76,7 +76,7 @@ impl Integrator {
         whole.chain([Self::fine(substeps)]).collect()
     }
 
-    /// Substeps that a user gives.
+    /// Substeps that a user gives, checked against the limit.
     fn checked(substeps: NonZeroU32) -> Result<Self, IntegratorError> {
         match substeps.get() <= SUBSTEPS {
             true => Ok(Self::fine(substeps)),
@@ -98,7 +98,7 @@ impl Default for Integrator {
     }
 }
 
-/// As on a command line: a scheme's name, or `fine:N`.
+/// As written on a command line: a scheme's name, or `fine:N`.
 impl FromStr for Integrator {
     type Err = IntegratorError;
 
@@ -117,7 +117,7 @@ impl Display for Integrator {
     }
 }
 
-/// An integrator as it stands in files.
+/// An integrator as written in files.
 #[derive(Serialize, Deserialize)]
 #[serde(
     untagged,

@@ -35,7 +35,7 @@ impl Objective {
     /// The value at `state` (positions, then velocities) after `tau` was held, at `time_s`.
     ///
     /// # Panics
-    /// When `state` or `tau` has another number of joints.
+    /// When `state` or `tau` has a different number of joints.
     pub fn value(&self, state: &[f64], tau: &[f64], time_s: f64) -> f64 {
         self.program.eval(&[state, tau, &[time_s]].concat())[0]
     }

@@ -2,8 +2,8 @@ use std::borrow::Cow;
 
 use crate::model::Dynamics;
 
-/// A model's program at one point of its parameter space: what is simulated. A model stands for itself at its own
-/// values; a fit moves over other points without another program.
+/// A model's program at one point of its parameter space: what is simulated. A model stands for the point at its own
+/// values; a fit visits other points with the same program.
 #[derive(Debug, Clone)]
 pub struct Point<'d> {
     pub dynamics: &'d Dynamics,
@@ -14,7 +14,7 @@ impl<'d> Point<'d> {
     /// `dynamics` with other values of its parameters, in its order and units.
     ///
     /// # Panics
-    /// When `values` has not one entry a parameter.
+    /// When `values` does not have one entry per parameter.
     pub fn new(dynamics: &'d Dynamics, values: impl Into<Cow<'d, [f64]>>) -> Self {
         let values = values.into();
         let expected = dynamics.parameters.len();

@@ -7,16 +7,16 @@
 pub struct Scheme {
     /// As it is written in files and on the command line.
     pub name: &'static str,
-    /// As a sentence calls it, after "the".
+    /// Its name in a sentence, after "the".
     pub title: &'static str,
     /// The error over a given time is proportional to the step's length to this power.
     pub order: u32,
     /// At least one.
     pub stages: &'static [Stage],
     /// For schemes of one stage: positions move with the new velocities, v' = v + h f_v and q' = q + h (f_q + h f_v).
-    /// Where f_q = v this is q' = q + h v'; whatever else f_q holds is taken at the step's start.
+    /// If f_q = v, this is q' = q + h v'; any other part of f_q is taken at the step's start.
     pub semi_implicit: bool,
-    /// Rate of decay times the length of a step up to which the steps decay as well.
+    /// Largest decay rate times step length at which the steps decay as well.
     pub most_damping: f64,
 }
 
@@ -27,11 +27,11 @@ pub struct Stage {
     pub time: f64,
     /// How far along its slope the next stage lies, as a share of the step; 0 after the last.
     pub reach: f64,
-    /// Of its slope in the step's; the weights sum to 1.
+    /// Weight of its slope in the step's slope; the weights sum to 1.
     pub weight: f64,
 }
 
-/// Order 1, and symplectic where forces depend on positions alone.
+/// Order 1, and symplectic if forces depend on positions alone.
 pub const SEMI_IMPLICIT_EULER: &Scheme = &Scheme {
     name: "semi_implicit_euler",
     title: "semi-implicit Euler method",
@@ -75,7 +75,7 @@ impl Scheme {
     }
 }
 
-/// Schemes are told apart by their names.
+/// Schemes are distinguished by their names.
 impl PartialEq for Scheme {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name

@@ -6,7 +6,7 @@ use crate::expr::Tape;
 use crate::lanes::Row;
 
 /// The position sensors of a model, for `W` trajectories: they measure the angles of the rig unless an effect, such as
-/// backlash, stands between joint and sensor.
+/// backlash, acts between joint and sensor.
 pub struct Sensors<'d, const W: usize> {
     tape: Option<Tape<'d, f64, W>>,
     joints: usize,
@@ -82,7 +82,7 @@ impl<'d, const W: usize> Sensors<'d, W> {
     }
 }
 
-/// The sensor effect may depend on velocities, which are estimated from the corrected angles: number of iterations.
+/// Number of iterations: the sensor effect may depend on velocities, which are estimated from the corrected angles.
 const PASSES: usize = 5;
 
 /// A log with measured angles replaced by those of the rig.

@@ -1,8 +1,8 @@
 use super::{Commands, Point, Scheme, Sensors, StepTorque, Stepper, substeps};
 use crate::lanes::Row;
 
-/// `W` trajectories of one model side by side: torques are commanded and held, delays and lags make of them what acts,
-/// a scheme integrates the motion, and sensors show its angles.
+/// `W` trajectories of one model side by side: torques are commanded and held, delays and lags turn them into the
+/// acting torques, a scheme integrates the motion, and sensors show its angles.
 pub struct Simulator<'d, const W: usize> {
     /// `[2n][lane]`: positions, then velocities.
     pub state: Vec<Row<f64, W>>,
@@ -11,20 +11,20 @@ pub struct Simulator<'d, const W: usize> {
     torque: StepTorque<W>,
 }
 
-/// A stretch of time over which commanded torques are held, one in each lane.
+/// An interval over which commanded torques are held, one interval per lane.
 #[derive(Debug, Clone, Copy)]
 pub struct Hold<'a, const W: usize> {
-    /// What each lane's model makes of its commands.
+    /// The filtered commands of each lane's model.
     pub commands: [&'a Commands<'a>; W],
     /// `[joint][lane]`, as commanded, in N m (or N).
     pub held: &'a [Row<f64, W>],
-    /// `[joint][lane]`, added to what acts; none where empty.
+    /// `[joint][lane]`, added to the acting torque; none if empty.
     pub force: &'a [Row<f64, W>],
     /// Its ends and its length, in s.
     pub from: Row<f64, W>,
     pub to: Row<f64, W>,
     pub length: Row<f64, W>,
-    /// The equal parts that are integrated one after the other.
+    /// Number of equal parts, integrated one after the other.
     pub substeps: usize,
 }
 
@@ -83,7 +83,7 @@ impl<'d, const W: usize> Simulator<'d, W> {
         }
     }
 
-    /// The same from a state (`[2n][lane]`: positions, then velocities).
+    /// The model starting at a state (`[2n][lane]`: positions, then velocities).
     #[must_use]
     pub fn starting_at(mut self, state: impl IntoIterator<Item = Row<f64, W>>) -> Self {
         self.state.clear();
@@ -110,7 +110,7 @@ impl<'d, const W: usize> Simulator<'d, W> {
             .advance(&mut self.state, &self.torque.mean, from, length, substeps);
     }
 
-    /// Move the states from a row of each lane's history of commands to the next, in substeps of at most `longest_s`.
+    /// Move the states from a row of each lane's command history to the next, in substeps of at most `longest_s`.
     pub fn follow(&mut self, commands: [&Commands<'_>; W], rows: [usize; W], longest_s: f64) {
         let held = Commands::held(commands, rows);
         let ends = [rows, rows.map(|row| row + 1)].map(|rows| Commands::times(commands, rows));
@@ -118,7 +118,7 @@ impl<'d, const W: usize> Simulator<'d, W> {
         self.advance(&Hold::between(commands, &held, ends, substeps));
     }
 
-    /// The angles that sensors show where each lane's history of commands has come to a row, and the velocities, both
+    /// The angles that sensors show when each lane's command history has reached a row, and the velocities, both
     /// `[n][lane]`.
     pub fn shown(&mut self, commands: [&Commands<'_>; W], rows: [usize; W]) -> [&[Row<f64, W>]; 2] {
         let before = || Commands::just_before(commands, rows);
@@ -127,7 +127,7 @@ impl<'d, const W: usize> Simulator<'d, W> {
         [angles, &self.state[angles.len()..]]
     }
 
-    /// The same at `time` (s), after the last hold.
+    /// The angles that sensors show at `time` (s), after the last hold.
     pub fn angles_at(&mut self, time: Row<f64, W>) -> &[Row<f64, W>] {
         let n = self.state.len() / 2;
         self.sensors
@@ -141,7 +141,7 @@ impl<'d, const W: usize> Simulator<'d, W> {
 }
 
 impl Simulator<'_, 1> {
-    /// Let the model be in this state: positions, then velocities.
+    /// Put the model in this state: positions, then velocities.
     pub fn put(&mut self, state: &[f64]) {
         assert_eq!(state.len(), self.state.len(), "one value for each state");
         for (lane, value) in self.state.iter_mut().zip(state) {

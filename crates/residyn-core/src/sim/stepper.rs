@@ -38,7 +38,8 @@ impl<'d, const W: usize> Stepper<'d, W> {
     }
 
     /// Advance `state` (`[2n][lane]`: positions, then velocities) from `time` by `length` seconds in `substeps` equal
-    /// substeps. `tau` (`[n][lane]`) acts over all of them or, where it differs, `[substep * n + joint][lane]`.
+    /// substeps. `tau` (`[n][lane]`) acts over all of them or, if it differs between them,
+    /// `[substep * n + joint][lane]`.
     pub fn advance(
         &mut self,
         state: &mut [Row<f64, W>],

@@ -2,19 +2,19 @@
 
 use crate::lanes::Row;
 
-/// In fits, and in motions that are designed for them: at 2 ms the classical Runge-Kutta method stays stable and
-/// accurate with dry friction smoothed to a fraction of a percent of the top speed.
+/// In fits, and in motions designed for them: at 2 ms the classical Runge-Kutta method stays stable and accurate with
+/// dry friction smoothed to a fraction of a percent of the top speed.
 pub const FIT_S: f64 = 2e-3;
 /// In the final estimate of a model that has been chosen.
 pub const FINE_FIT_S: f64 = 5e-4;
 /// In the first integration of an open-loop error, whose steps are then halved until it no longer changes, and in
 /// pictures of predictions.
 pub const PREDICTION_S: f64 = 1e-3;
-/// In simulated rigs: far below what any fit uses, so that no model of theirs is right by sharing their error.
+/// In simulated rigs: far below what any fit uses, so that no model fits them by sharing their integration error.
 pub const RIG_S: f64 = 1e-4;
 
-/// Rounding of times may make a step longer than a whole number of longest substeps by this: stamps of Unix time are a quarter
-/// of a microsecond apart.
+/// Rounding of times may make a step exceed a whole number of longest substeps by this much: Unix time stamps are a
+/// quarter of a microsecond apart.
 const ROUNDING_S: f64 = 2.5e-7;
 
 /// How many equal substeps of at most `longest_s` each of these steps needs, one number for all lanes.

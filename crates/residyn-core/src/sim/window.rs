@@ -1,6 +1,6 @@
 use crate::data::{Log, half_width_s, is_gap, local_cubic, row_after};
 
-/// A stretch of one log, rows `first..=last`, over which a model is integrated open loop.
+/// A piece of one log, rows `first..=last`, over which a model is integrated open loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
     /// Index of the log.
@@ -57,7 +57,7 @@ fn window_at(log: &Log, step_s: f64, first: usize, length_s: f64) -> Result<usiz
     // Half a step of tolerance, because logged times are rounded decimals.
     let end = log.time[first] + length_s + 0.5 * step_s;
     let last = log.time.partition_point(|t| *t <= end) - 1;
-    // Rows further apart than the length are no window.
+    // Rows further apart than the length do not make a window.
     if last == first || log.time[last] < log.time[first] + length_s - 0.5 * step_s {
         return Err(last + 1);
     }

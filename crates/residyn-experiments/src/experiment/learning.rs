@@ -93,7 +93,7 @@ impl Method {
         })
     }
 
-    /// Whether it begins with a model.
+    /// Whether it starts from a model.
     pub(super) fn has_prior(&self) -> bool {
         !matches!(self.learner.prior, Prior::Nothing)
     }

@@ -1,5 +1,5 @@
 //! The published experiments: how much data a model needs until planning with it is as good as planning with the plant's
-//! own equations; and [`undeclared_effect`]: how much of the return comes back when the loop is closed.
+//! own equations; and [`undeclared_effect`]: how much of the return closing the loop recovers.
 
 mod config;
 mod error;

@@ -12,7 +12,7 @@ use crate::mbrl::{EpisodeScore, Evaluator, RunError};
 use residyn_control::control::Predictor;
 use residyn_io::runs::{RunFolder, Shard};
 
-/// A method with one seed. It is done in a folder of its own, where its results are found again.
+/// A method with one seed. It runs in its own folder, where its results are found again.
 #[derive(Clone, Copy)]
 pub(super) struct Piece<'s> {
     actor: Actor<'s>,
@@ -54,7 +54,7 @@ impl Actor<'_> {
 }
 
 impl Session {
-    /// All pieces, those that take longest first.
+    /// All pieces, the longest first.
     pub(super) fn pieces(&self) -> Vec<Piece<'_>> {
         let learners: Vec<_> = self.methods.iter().map(Actor::Learner).collect();
         let prior = self.methods.iter().find(|method| method.has_prior());
@@ -71,8 +71,9 @@ impl Session {
         pieces
     }
 
-    /// Do a shard of the pieces with these receding horizons, or else that of the task; those that learn with these after
-    /// the last round, or else that of the task after each. The results of each method, in the order of the seeds.
+    /// Do a shard of the pieces with these receding horizons, or else with the task's; learners are scored with these
+    /// after the last round, or else with the task's after each round. Returns the results of each method in the order
+    /// of the seeds.
     pub(super) fn do_shard(
         &self,
         shard: Shard,
@@ -132,7 +133,7 @@ impl Session {
         horizons.par_iter().with_max_len(1).map(score).collect()
     }
 
-    /// The plant's own equations, integrated as those of models are.
+    /// The plant's own equations, integrated like the models' equations.
     fn perfect(&self) -> Predictor {
         Predictor::of_equations(self.plant.dynamics(), self.task.integrator)
     }
@@ -160,7 +161,7 @@ impl Session {
     }
 }
 
-/// Puts the results of all seeds together.
+/// Combines the results of all seeds.
 impl From<Vec<Entries>> for Course {
     fn from(seeds: Vec<Entries>) -> Self {
         let entry = |k: usize| {

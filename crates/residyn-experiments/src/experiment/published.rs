@@ -20,7 +20,7 @@ impl Experiment {
         }
     }
 
-    /// The receding horizons to compare; none where amounts of data are.
+    /// The receding horizons to compare; `None` if amounts of data are compared.
     fn horizons(self, session: &Session) -> Option<&[usize]> {
         match self {
             Self::PhysicsPrior | Self::OfflinePrior => None,
@@ -78,7 +78,7 @@ impl Session {
             .map(drop)
     }
 
-    /// What decides the numbers of an experiment.
+    /// What determines the numbers of an experiment.
     pub fn run_of_experiment(&self, experiment: Experiment) -> Identity {
         self.identity(experiment.name(), self.resolved())
     }

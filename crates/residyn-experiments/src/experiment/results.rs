@@ -22,12 +22,12 @@ pub struct Results {
     pub experiment: String,
     pub task: String,
     pub seeds: Vec<u64>,
-    /// The receding horizons (steps carried out of each plan) that the entries of the methods stand for, if they do not stand
-    /// for amounts of data.
+    /// The receding horizons (executed steps of each plan) that the entries of the methods stand for, if they do not
+    /// stand for amounts of data.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub receding_horizon: Option<Vec<usize>>,
     pub methods: BTreeMap<String, Course>,
-    /// How far each of the learning methods came.
+    /// How far each learning method came.
     pub reached: BTreeMap<String, Reached>,
     /// The whole configuration, as resolved.
     pub config: Value,
@@ -118,7 +118,7 @@ impl Results {
 
     /// The answer in a sentence.
     pub fn headline(&self) -> String {
-        let (what, told): (_, Vec<String>) = match &self.receding_horizon {
+        let (what, message): (_, Vec<String>) = match &self.receding_horizon {
             Some(horizons) => {
                 let best = |name: &String| format!("{name} {}", self.methods[name].best(horizons));
                 let what = "receding horizon with the highest return, in steps".to_owned();
@@ -133,10 +133,10 @@ impl Results {
                 (what, self.reached.iter().map(after).collect())
             }
         };
-        format!("{what}: {}", told.join(", "))
+        format!("{what}: {}", message.join(", "))
     }
 
-    /// After how much data a method reached what counts.
+    /// After how much data a method reached the required fraction.
     fn after(&self, name: &str, reached: &Reached) -> String {
         match reached.transitions_to_90_percent {
             Some(transitions) => format!("after {transitions} transitions"),

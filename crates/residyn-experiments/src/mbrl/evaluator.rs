@@ -30,7 +30,7 @@ impl Evaluator<'_> {
     /// Evaluates a model in an episode, planning anew every `replan` steps.
     ///
     /// # Errors
-    /// A plant that diverges, and a plan of which all candidates do.
+    /// A plant that diverges, and a plan whose candidates all diverge.
     pub fn score(&self, predictor: &Predictor, replan: usize) -> Result<EpisodeScore, RunError> {
         let (episode, diverged) = self.episode(predictor, replan)?;
         Ok(EpisodeScore {
@@ -43,7 +43,7 @@ impl Evaluator<'_> {
     /// The whole episode, and the number of candidate plans that diverged.
     ///
     /// # Errors
-    /// A plant that diverges, and a plan of which all candidates do.
+    /// A plant that diverges, and a plan whose candidates all diverge.
     pub fn episode(
         &self,
         predictor: &Predictor,

@@ -10,9 +10,9 @@ use residyn_train::{Checkpoint, Training, save};
 
 const ROUNDS: &str = "rounds.jsonl";
 
-/// What a run keeps in its folder: `stretch-000.csv` and on, the recorded motion; `rounds.jsonl`, a line for each round;
-/// and `checkpoint-001` or later, the model after the last one. A run that is resumed from them ends with the same
-/// numbers.
+/// What a run keeps in its folder: `stretch-000.csv` and so on, the recorded motion; `rounds.jsonl`, a line for each
+/// round; and `checkpoint-001` or later, the model after the last one. A run that is resumed from them ends with the
+/// same numbers.
 pub struct Folder {
     folder: RunFolder,
     rounds: Vec<Round>,

@@ -12,7 +12,7 @@ pub enum Prior {
     Nothing,
     /// Equations, whose parameters are trained.
     Equations(Box<Dynamics>),
-    /// A trained model, which is trained further where its learning rate is not zero.
+    /// A trained model, which is trained further if its learning rate is not zero.
     Trained(Box<HybridModel>),
 }
 
@@ -39,7 +39,7 @@ impl Learner {
             Prior::Equations(dynamics) => {
                 Some(HybridModel::physics(dynamics, &self.backend.device())?)
             }
-            // With tensors of its own: threads that share a tensor can deadlock, since the autodiff backend keeps all
+            // With its own tensors: threads that share a tensor can deadlock, since the autodiff backend keeps all
             // connected tensors in one graph and does not take its locks in a fixed order.
             Prior::Trained(model) => Some(model.with_weights(&model.weights())?),
         })

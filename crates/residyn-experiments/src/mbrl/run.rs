@@ -77,7 +77,7 @@ impl Run<'_> {
     /// Carries out a round: train, evaluate, gather.
     ///
     /// # Errors
-    /// A loss that is not finite, a plant that diverges, and a plan of which all candidates do.
+    /// A loss that is not finite, a plant that diverges, and a plan whose candidates all diverge.
     pub fn round(&self, state: &mut RunState) -> Result<(Round, Training), RunError> {
         let (round, seed) = (state.rounds, self.seed);
         let segments = transitions(&state.logs, self.task.joints())?;

@@ -8,7 +8,7 @@ use crate::{ClientError, Predictions, Samples};
 
 const CLIENT: &str = include_str!("../../../../docs/clients/c.c");
 
-/// What a header predicts, compiled into a program.
+/// The predictions of a header, compiled into a program.
 pub(super) fn predict(path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
     let io = |error: std::io::Error| {
         ClientError::Unavailable(format!("no temporary folder for a program: {error}"))
@@ -86,7 +86,7 @@ fn run(mut program: Command, input: &str) -> std::io::Result<String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// One line a point, then one a step of the rollout.
+/// One line per point, then one per step of the rollout.
 fn parsed(printed: &str, samples: &Samples) -> Option<Predictions> {
     let row = |line: &str| -> Option<Vec<f64>> {
         line.split_whitespace()

@@ -21,7 +21,7 @@ pub(super) fn derivative(model: &ExportModel, names: &Names) -> String {
         )
 }
 
-/// The function of the inverse dynamics, for equations of torques without a network.
+/// The function for the inverse dynamics; empty with a network or without a torque balance.
 pub(super) fn inverse(model: &ExportModel, names: &Names) -> String {
     if model.prior.is_some() || model.residual.is_some() {
         return String::new();

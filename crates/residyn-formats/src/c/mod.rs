@@ -117,7 +117,7 @@ fn head(model: &ExportModel, names: &Names) -> String {
     format!("/*\n{lines} */\n")
 }
 
-/// Text that does not end a comment.
+/// Text that cannot end a comment.
 fn comment(text: &str) -> String {
     let text = text
         .replace("*/", "* /")
@@ -168,7 +168,7 @@ fn parameters(model: &ExportModel, names: &Names) -> String {
     )
 }
 
-/// Capacity for past torques relative to what delays span at the exported step: parameters may change, and steps may be
+/// Capacity for past torques, relative to the delays at the exported step: parameters may change, and steps may be
 /// shorter.
 const HEADROOM: f64 = 2.0;
 

@@ -5,10 +5,10 @@ use residyn_core::data::Joint;
 use residyn_core::expr::{Notation, Part};
 use residyn_core::model::CommandFilter;
 
-/// Names of one model's parts in C, and the notation of its formulas. In templates and generated code all names begin with
-/// `model_` or `MODEL_` until [`Names::fill`] replaces these.
+/// Names of one model's parts in C, and the notation of its formulas. In templates and generated code all names begin
+/// with `model_` or `MODEL_` until [`Names::fill`] replaces these prefixes.
 pub(crate) struct Names {
-    /// Prefix of functions and types; in capitals that of macros.
+    /// Prefix of functions and types; in capitals, the prefix of macros.
     pub lower: String,
     pub upper: String,
     /// C expressions for the inputs of the equations.

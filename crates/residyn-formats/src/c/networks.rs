@@ -15,12 +15,12 @@ pub(super) fn tables(model: &ExportModel, names: &Names) -> String {
     }
 }
 
-/// Code that adds their outputs to the rates.
+/// Code that adds the networks' outputs to the rates.
 pub(super) fn added(model: &ExportModel) -> String {
     each(model, include_str!("network_added.h"))
 }
 
-/// Code that adds their derivatives to those of the rates.
+/// Code that adds the networks' derivatives to those of the rates.
 pub(super) fn jacobian_added(model: &ExportModel) -> String {
     each(model, include_str!("network_jacobian_added.h"))
 }
@@ -100,7 +100,7 @@ fn linear_layers(network: &MlpWeights) -> String {
     (0..=last).map(layer).collect()
 }
 
-/// Where a layer reads and writes: two buffers in turn.
+/// The buffers that a layer reads from and writes to: two, used alternately.
 fn buffers(name: &str, layer: usize) -> [String; 2] {
     [layer % 2, (layer + 1) % 2].map(|place| format!("{name}[{place}]"))
 }

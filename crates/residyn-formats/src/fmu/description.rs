@@ -18,7 +18,7 @@ impl Standard {
         let outputs = places(variables, |role| {
             matches!(role, Role::State { output: true })
         });
-        // The rates alone are unknown at the start.
+        // Only the rates are unknown at the start.
         let rates = places(variables, |role| matches!(role, Role::Rate { .. }));
         let [output, rate, unknown] = self.unknowns;
         let all = variables.iter().enumerate();
@@ -58,7 +58,7 @@ impl Standard {
         )
     }
 
-    /// One element for each of the variables at these places.
+    /// One element for each variable at these places.
     fn each(&self, element: &str, places: &[usize]) -> String {
         let elements = places
             .iter()
@@ -105,7 +105,7 @@ fn kind(role: &Role) -> &'static str {
     }
 }
 
-/// Attributes of its value, each preceded by a space; variables are counted from `first`.
+/// Attributes of a variable's value, each preceded by a space; variables are counted from `first`.
 fn value(variable: &Variable, first: usize) -> String {
     let mut text = match &variable.role {
         Role::Time => String::new(),

@@ -19,7 +19,7 @@ use super::{ExportError, ExportModel, File, Format};
 use residyn_core::data::Joint;
 use residyn_core::model::CommandFilter;
 
-/// What is specific to one version of the standard. Templates are those of [`filled`].
+/// The specifics of one version of the standard. Templates are filled in by [`filled`].
 struct Standard {
     /// Name and contents of its source file.
     source: (&'static str, &'static str),
@@ -29,7 +29,7 @@ struct Standard {
     build: Option<&'static str>,
     /// Number of the first variable.
     first: usize,
-    /// Template of the element of a variable.
+    /// Template of a variable's element.
     variable: &'static str,
     /// Templates of the elements for outputs, derivatives, and variables that are unknown at the start.
     unknowns: [&'static str; 3],
@@ -66,7 +66,7 @@ const CLIENT: PythonClient = PythonClient {
     packages: "fmpy",
 };
 
-/// The predictions of FMPy, where the unit holds a library for this machine.
+/// The predictions of FMPy, if the unit holds a library for this machine.
 fn predict(path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
     let refused =
         |error: &dyn std::error::Error| ClientError::Failed(format!("{}: {error}", path.display()));

@@ -34,7 +34,7 @@ struct Equations {
     outputs: Vec<usize>,
 }
 
-/// What the model in `path` predicts.
+/// The predictions of the model in `path`.
 pub(super) fn predict(path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
     let failed =
         |error: &dyn std::fmt::Display| ClientError::Failed(format!("{}: {error}", path.display()));

@@ -18,24 +18,24 @@ pub(super) const VERSION: u64 = 1;
 /// The JSON file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Description {
-    /// Version of the format, of the program that wrote it.
+    /// Version of the description's format.
     pub residyn_model: u64,
     /// Version of the program that wrote it.
     pub residyn: String,
     pub about: String,
     #[serde(flatten)]
     pub shape: ModelShape,
-    /// For each joint whether it slides (m, N) rather than turns (rad, N m).
+    /// For each joint, whether it slides (m, N) rather than turns (rad, N m).
     pub prismatic: Vec<bool>,
     pub integrator: Integrator,
     pub step_s: f64,
-    /// The file of the learnable numbers, beside this one.
+    /// The file of the learnable numbers, next to this one.
     pub weights: PathBuf,
     /// Text of the model file.
     pub model_toml: String,
     /// Configuration and seed of the run that made the model.
     pub origin: Value,
-    /// For readers that know no model files.
+    /// For readers that do not know model files.
     #[serde(skip_deserializing)]
     equations: Equations,
 }
@@ -43,15 +43,15 @@ pub struct Description {
 /// The equations as operations. They follow from the rest of the description.
 #[derive(Debug, Clone, Default, Serialize)]
 struct Equations {
-    /// Values of the file of weights once more, with units and intervals.
+    /// The values in the file of weights, repeated with units and intervals.
     parameters: Vec<Value>,
     effects: Vec<ExportedEffect>,
     /// Delays and lags of the commanded torques.
     filters: Vec<SavedFilter>,
-    /// The same, discretised for the step of the file: `mean` torques over each substep and the lagged torque at the
+    /// The filters, discretised for the file's step: `mean` torques over each substep and the lagged torque at the
     /// `end`, as coefficients of the lagged torque and of the torques at two `places`.
     held: Vec<DiscreteFilter>,
-    /// A held step is integrated in so many equal substeps, each through these stages.
+    /// Number of equal substeps in which a held step is integrated, each through these stages.
     substeps: usize,
     /// `[time, reach, weight]` as shares of a substep: when the stage is evaluated, how far along its slope the next
     /// one lies, and the weight of its slope.
@@ -64,9 +64,9 @@ struct Equations {
     inputs: Vec<String>,
     /// `["input", k]`, `["const", x]` or a function and the positions of its arguments in this list.
     operations: Vec<Value>,
-    /// Which operations are the rates of the positions, then of the velocities.
+    /// Indices of the operations that are the rates of the positions, then of the velocities.
     outputs: Vec<usize>,
-    /// Prefixes of the networks' tensors, in the order in which their outputs are added to the last of the rates.
+    /// Prefixes of the networks' tensors, in the order in which their outputs are added to the last rates.
     networks: Vec<&'static str>,
 }
 

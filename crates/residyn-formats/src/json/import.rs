@@ -68,7 +68,7 @@ impl Imported {
         &self.description.residyn
     }
 
-    /// Read a description and the weights beside it. Effects in its model file are looked up in `effects`.
+    /// Read a description and the weights next to it. Effects in its model file are looked up in `effects`.
     ///
     /// # Errors
     /// A missing or damaged file, another version, or files that do not belong together.
@@ -94,7 +94,8 @@ impl Imported {
     }
 }
 
-/// The description in `path`. Its version is checked first, since another one may describe anything else differently.
+/// The description in `path`. Its version is checked first, since another version may describe everything else
+/// differently.
 fn description(path: &Path) -> Result<Description, ImportError> {
     let path = path.to_owned();
     let json = read_saved(&path).map_err(|source| ImportError::Unreadable {
@@ -116,7 +117,7 @@ fn description(path: &Path) -> Result<Description, ImportError> {
     }
 }
 
-/// The file of weights beside a description: one that came from elsewhere must not name any other file.
+/// The file of weights next to a description: a description from elsewhere must not name any other file.
 fn weights_of(path: &Path, named: &Path) -> Result<PathBuf, ImportError> {
     let weights = path.with_file_name(named);
     let is_name = named.file_name() == Some(named.as_os_str());
@@ -129,7 +130,7 @@ fn weights_of(path: &Path, named: &Path) -> Result<PathBuf, ImportError> {
     Ok(weights)
 }
 
-/// Refuse weights of other joints or parameters. A network as prior needs no equations, so those of its model file may be
+/// Refuse weights for other joints or parameters. A network as prior needs no equations, so its model file may have
 /// any.
 fn check(path: &Path, shape: &ModelShape, declared: &Dynamics) -> Result<(), ImportError> {
     if shape.joints != declared.joints {

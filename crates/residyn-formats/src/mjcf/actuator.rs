@@ -15,7 +15,7 @@ use residyn_core::model::chain::Servo;
 pub(super) struct Drive {
     /// Effort limit, N m or N.
     pub effort: Option<f64>,
-    /// The position loop, where it is one.
+    /// The position loop, if the drive is one.
     pub servo: Option<Servo>,
 }
 
@@ -66,7 +66,7 @@ fn gear(drive: &Element<'_, '_>) -> Result<f64, FileError> {
         .unwrap_or(1.0))
 }
 
-/// The position loop that an actuator is: `position`, or a `general` one whose bias is that of a position loop.
+/// An actuator's position loop: `position`, or `general` with the bias of a position loop.
 fn servo(drive: &Element<'_, '_>, kind: &str, gear: f64) -> Result<Option<Servo>, FileError> {
     let number = |key: &str, place: usize| -> Result<Option<f64>, FileError> {
         Ok(drive.list(key)?.and_then(|list| list.get(place).copied()))
@@ -94,7 +94,7 @@ fn servo(drive: &Element<'_, '_>, kind: &str, gear: f64) -> Result<Option<Servo>
         }
         _ => return Ok(None),
     };
-    // The command is the position before the gear, and forces grow by the gear once more.
+    // The command is the position before the gear, and the gear scales the force once more.
     #[allow(clippy::float_cmp)] // as written
     let is_direct = gear == 1.0;
     Ok(is_direct.then_some(Servo { stiffness, damping }))
@@ -116,12 +116,12 @@ fn is_plain(drive: &Element<'_, '_>, kind: &str) -> bool {
     kind == "motor" || kind == "general" && of_general
 }
 
-/// A range of an actuator, and the switch that says whether it holds.
+/// A range of an actuator, and the switch that enables it.
 type Range = [&'static str; 2];
 const CONTROL: Range = ["ctrlrange", "ctrllimited"];
 const FORCE: Range = ["forcerange", "forcelimited"];
 
-/// The smallest of some limits, before the gear.
+/// The smallest limit in force, before the gear.
 fn limit(
     drive: &Element<'_, '_>,
     autolimits: bool,
@@ -136,7 +136,7 @@ fn limit(
     Ok(limit)
 }
 
-/// The bound of a range that is symmetric about zero; others are noted.
+/// The bound of a range that is symmetric about zero; other ranges are noted.
 pub(super) fn symmetric(
     element: &Element<'_, '_>,
     [low, high]: [f64; 2],

@@ -12,21 +12,21 @@ use residyn_core::model::FileError;
 /// The default classes of a file.
 pub(super) struct Classes<'s, 'x> {
     source: &'s Source<'x>,
-    /// For each class its own `<default>` and the enclosing ones, innermost first.
+    /// For each class, its `<default>` and the enclosing ones, innermost first.
     classes: HashMap<&'s str, Vec<Node<'s, 'x>>>,
     outermost: &'s str,
 }
 
 impl<'s, 'x> Classes<'s, 'x> {
     /// # Errors
-    /// A class of more elements than are looked through at each element.
+    /// A class with more elements than are searched for each element.
     pub fn new(source: &'s Source<'x>, root: Node<'s, 'x>) -> Result<Self, FileError> {
         let mut new = Self {
             source,
             classes: HashMap::new(),
             outermost: "main",
         };
-        // Several top-level ones are one class, in which later ones prevail.
+        // Several top-level defaults form one class, in which later ones prevail.
         let mut top: Vec<Node<'s, 'x>> = named(root, "default").collect();
         top.reverse();
         if let Some(name) = top.iter().find_map(|node| node.attribute("class")) {
@@ -60,12 +60,12 @@ impl<'s, 'x> Classes<'s, 'x> {
         Ok(())
     }
 
-    /// The name of the class that applies where none is named.
+    /// The name of the class that applies if none is named.
     pub fn outermost(&self) -> &'s str {
         self.outermost
     }
 
-    /// An element with its defaults, under any of `tags`; `class` applies where it names none itself.
+    /// An element with its defaults, under any of `tags`; `class` applies if it names none itself.
     pub fn element(
         &self,
         node: Node<'s, 'x>,

@@ -6,7 +6,7 @@ use crate::robot::tree::Mimics;
 use crate::xml::{Source, elements, named};
 use residyn_core::model::FileError;
 
-/// What joints follow others, by their names. Other constraints are refused.
+/// What each follower joint follows, by the follower's name. Other constraints are refused.
 pub(super) fn mimics(
     source: &Source<'_>,
     root: Node<'_, '_>,

@@ -28,7 +28,7 @@ impl Angles {
         })
     }
 
-    /// An angle, rad; 0 where it is not given.
+    /// An angle in rad; 0 if it is not given.
     pub fn angle(&self, element: &Element<'_, '_>, key: &str) -> Result<f64, FileError> {
         let angle = element.number_or(key, 0.0)?;
         Ok(if self.in_degrees {
@@ -86,7 +86,7 @@ impl Angles {
         }
     }
 
-    /// The numbers of an attribute, of which the last, or all, are angles.
+    /// The numbers of an attribute, of which the last one or all are angles.
     fn in_rad<const N: usize>(
         &self,
         element: &Element<'_, '_>,

@@ -16,7 +16,7 @@ use crate::xml::{self, Source, elements, named};
 use residyn_core::model::FileError;
 use residyn_core::model::chain::{Chain, Drivetrain, Inertia, Pose, Spring};
 
-/// Read the serial chain from the world of an MJCF file to the body `tip`, without one to the end of the longest branch.
+/// Read the serial chain from the world of an MJCF file to the body `tip`, by default to the end of the longest branch.
 ///
 /// # Errors
 /// An unreadable file, invalid XML, anything but a serial chain of hinge and slide joints, or data outside of the file,
@@ -41,19 +41,19 @@ pub fn read_mjcf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
     })
 }
 
-/// Attributes of the compiler section without influence on what is read here.
+/// Attributes of the compiler section that do not affect what is read here.
 const COMPILER: &str = "\
     angle eulerseq autolimits coordinate inertiafromgeom strippath meshdir texturedir assetdir \
     discardvisual usethread fusestatic exactmeshinertia convexhull fitaabb alignfree saveinertial \
     balanceinertia";
-/// Attributes of a joint that are read here or have no influence within its range.
+/// Attributes of a joint that are read here or have no effect within its range.
 const JOINT: &str = "\
     name class type group pos axis springdamper limited range actuatorfrclimited actuatorfrcrange \
     solreflimit solimplimit solreffriction solimpfriction stiffness margin ref springref armature \
     damping frictionloss user";
-/// Attributes of a body that are read here or have no influence.
+/// Attributes of a body that are read here or have no effect.
 const BODY: &str = "name childclass pos quat axisangle euler xyaxes zaxis mocap user sleep";
-/// Flags that switch forces of the joints off.
+/// Flags that switch off joint forces.
 const FORCES: &[&str] = &["passive", "spring", "damper", "frictionloss"];
 
 pub(super) struct Reader<'s, 'x> {
@@ -66,7 +66,7 @@ pub(super) struct Reader<'s, 'x> {
     pub inertia_from_geom: String,
     /// Effort limit of the drive (N m or N), by joint.
     drives: HashMap<String, Drive>,
-    /// What joints follow others, by their names.
+    /// What each follower joint follows, by the follower's name.
     mimics: HashMap<String, Mimics>,
 }
 
@@ -110,7 +110,7 @@ impl<'s, 'x> Reader<'s, 'x> {
         })
     }
 
-    /// The joint of a name.
+    /// The joint with this name.
     pub fn joint(&self, name: &str) -> Result<Node<'s, 'x>, FileError> {
         let worlds = named(self.root, "worldbody");
         let mut joints = worlds.flat_map(|world| world.descendants());
@@ -124,7 +124,7 @@ impl<'s, 'x> Reader<'s, 'x> {
             })
     }
 
-    /// The default class of what is in a body.
+    /// The default class of a body's elements.
     pub fn class_of(&self, body: Node<'s, 'x>) -> &'s str {
         let mut around = body.ancestors();
         let given = around.find_map(|node| node.attribute("childclass"));
@@ -270,7 +270,7 @@ impl<'s, 'x> Reader<'s, 'x> {
         })
     }
 
-    /// The smaller of the effort limits of the joint and of its drive.
+    /// The smaller effort limit of the joint and its drive.
     fn effort(&self, joint: &Element<'s, 'x>, name: &str) -> Result<Option<f64>, FileError> {
         let range = joint.limits("actuatorfrcrange", "actuatorfrclimited", self.autolimits)?;
         let own = range.and_then(|range| actuator::symmetric(joint, range, "actuatorfrcrange"));
@@ -320,7 +320,7 @@ impl<'s, 'x> Reader<'s, 'x> {
         Ok(Inertia::central(mass, tensor, &pose))
     }
 
-    /// Note everything else in the file that acts on the motion.
+    /// Note everything else in the file that affects the motion.
     fn note_the_rest(&self) -> Result<(), FileError> {
         let section = |name| named(self.root, name).flat_map(elements);
         for (name, what) in [
@@ -346,7 +346,7 @@ fn is_of_body(node: Node<'_, '_>) -> bool {
             .is_some_and(|p| p.has_tag_name("body"))
 }
 
-/// A linear coefficient; higher ones, of a polynomial, must be zero.
+/// A linear coefficient; a polynomial's higher coefficients must be zero.
 pub(super) fn linear(joint: &Element<'_, '_>, key: &str) -> Result<f64, FileError> {
     let all = joint.list(key)?.unwrap_or_default();
     if all.iter().skip(1).any(|higher| *higher != 0.0)

@@ -17,7 +17,7 @@ use residyn_core::model::chain::{Drivetrain, Inertia};
 /// The text of the file at `path` with these changes.
 ///
 /// # Errors
-/// A file that is not read, joints without names, or values that no body has.
+/// A file that cannot be read, joints without names, or values that no body can have.
 pub fn rewrite(path: &Path, changes: &[Change]) -> Result<String, FileError> {
     let text = xml::text(path)?;
     let source = Source::new(path, &text)?;

@@ -156,7 +156,7 @@ fn actuator(joint: &Joint, drive: &Drive) -> String {
         let _ = write!(
             text,
             " biastype=\"affine\" biasprm=\"{}\"",
-            // The bias is by the length and the velocity of the actuator: those of the joint times the gear.
+            // The bias depends on the actuator's length and velocity: the joint's times the gear.
             numbers([constant, by_position / drive.gear, by_velocity / drive.gear])
         );
     }

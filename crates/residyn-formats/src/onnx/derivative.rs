@@ -101,7 +101,7 @@ fn binary(builder: &mut Builder, function: Binary, a: &Value, b: &Value) -> Valu
     builder.apply(operator, &[a, b])
 }
 
-/// ONNX has atan alone: for negative `x`, half a turn with the sign of `y` is added.
+/// ONNX has only atan: for negative `x`, half a turn with the sign of `y` is added.
 fn atan2(builder: &mut Builder, y: &Value, x: &Value) -> Value {
     let half = std::f64::consts::PI;
     let [zero, up, down] = [0.0, half, -half].map(|value| builder.constant(value));

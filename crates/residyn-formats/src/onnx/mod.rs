@@ -51,7 +51,7 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
     lost
 }
 
-/// Refuse numbers that single precision has none for.
+/// Refuse numbers that single precision cannot represent.
 fn check_single(model: &ExportModel) -> Result<(), ExportError> {
     let constant = |op: &Op| match op {
         Op::Const(value) => Some(*value),

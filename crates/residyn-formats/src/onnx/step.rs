@@ -12,7 +12,7 @@ use residyn_core::sim::Scheme;
 pub struct Inputs {
     pub state: Vec<Value>,
     pub torque: Vec<Value>,
-    /// Where the equations depend on it.
+    /// If the equations depend on it.
     pub time: Option<Value>,
 }
 
@@ -97,7 +97,7 @@ fn act(builder: &mut Builder, model: &ExportModel, inputs: &Inputs) -> Vec<Vec<V
     acting
 }
 
-/// A sum of values times constants, without those that are zero.
+/// A sum of values times constants, without zero terms.
 fn weighted<'v>(builder: &mut Builder, terms: impl Iterator<Item = (f64, &'v Value)>) -> Value {
     let mut sum: Option<Value> = None;
     for (factor, value) in terms.filter(|(factor, _)| *factor != 0.0) {
@@ -139,7 +139,7 @@ impl Step<'_, '_> {
         }
         if scheme.semi_implicit {
             let n = torque.len();
-            // The velocities' gain moves the positions, too: h^2 f_v.
+            // The change of velocity also moves the positions: h^2 f_v.
             let moved = self.along(&next[..n], self.h * self.h, &rates[n..]);
             next.splice(..n, moved);
         }

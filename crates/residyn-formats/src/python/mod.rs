@@ -1,5 +1,5 @@
 //! Python: one module that needs numpy alone, with the step, the derivative and the reward, and an environment of
-//! gymnasium where that is installed.
+//! gymnasium if that is installed.
 
 mod notation;
 

@@ -6,7 +6,7 @@ use roxmltree::Node;
 
 use super::mechanism::numbers;
 
-/// A file with changes by places in its text.
+/// A file with changes at places in its text.
 pub(crate) struct Edit<'x> {
     text: &'x str,
     changes: Vec<(Range<usize>, String)>,
@@ -20,7 +20,7 @@ impl<'x> Edit<'x> {
         }
     }
 
-    /// Give an attribute these numbers, unless it has them.
+    /// Give an attribute these numbers, unless it already has them.
     pub fn set(&mut self, node: Node<'_, '_>, key: &str, values: &[f64]) {
         let new = numbers(values.iter().copied());
         match node.attribute_node(key) {
@@ -30,7 +30,7 @@ impl<'x> Edit<'x> {
         }
     }
 
-    /// Take an attribute away, with the blanks before it.
+    /// Remove an attribute and the blanks before it.
     pub fn remove(&mut self, node: Node<'_, '_>, key: &str) {
         if let Some(given) = node.attribute_node(key) {
             let start = self.text[..given.range().start].trim_end().len();
@@ -38,7 +38,7 @@ impl<'x> Edit<'x> {
         }
     }
 
-    /// Put an element before the others in `node`, on a line of its own where these have such.
+    /// Insert an element before the others in `node`, on its own line if the others have theirs.
     pub fn insert(&mut self, node: Node<'_, '_>, element: &str) {
         let own = &self.text[node.range()];
         if let Some(first) = node.first_element_child() {
@@ -84,7 +84,7 @@ impl<'x> Edit<'x> {
         &tag[..end.unwrap_or(tag.len())]
     }
 
-    /// Where the last attribute of an element ends, or its name.
+    /// The end of an element's last attribute, or of its name.
     fn head_end(&self, node: Node<'_, '_>) -> usize {
         let name = node.range().start + 1 + self.name(node).len();
         let ends = node.attributes().map(|given| given.range().end);
@@ -92,7 +92,7 @@ impl<'x> Edit<'x> {
     }
 }
 
-/// Whether a text holds these numbers, but for rounding.
+/// Whether a text holds these numbers, up to rounding.
 fn holds(text: &str, values: &[f64]) -> bool {
     let given: Vec<f64> = text
         .split_whitespace()
@@ -101,7 +101,7 @@ fn holds(text: &str, values: &[f64]) -> bool {
     given.len() == values.len() && given.iter().zip(values).all(|(a, b)| same(*a, *b))
 }
 
-/// Whether two numbers are one but for rounding.
+/// Whether two numbers are equal up to rounding.
 pub(crate) fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-15 + 1e-12 * a.abs().max(b.abs())
 }

@@ -10,10 +10,10 @@ use crate::xml::{Source, named};
 use residyn_core::limits::is_reading;
 use residyn_core::model::FileError;
 
-/// An element: its own attributes, then those of its defaults where the format has such.
+/// An element: its own attributes, then those of its defaults, if the format has defaults.
 pub(crate) struct Element<'s, 'x> {
     source: &'s Source<'x>,
-    /// The first with an attribute prevails.
+    /// The first node with an attribute prevails.
     nodes: Vec<Node<'s, 'x>>,
 }
 
@@ -23,16 +23,16 @@ impl<'s, 'x> Element<'s, 'x> {
         Self { source, nodes }
     }
 
-    /// All elements of a name below the root as one; later ones prevail.
+    /// All elements with this name below the root, as one; later ones prevail.
     pub fn of_section(source: &'s Source<'x>, root: Node<'s, 'x>, name: &'static str) -> Self {
         let mut nodes: Vec<Node<'s, 'x>> = named(root, name).collect();
         nodes.reverse();
-        // Messages point at the root where the section is missing.
+        // Messages point at the root if the section is missing.
         nodes.push(root);
         Self { source, nodes }
     }
 
-    /// The element that gives an attribute: itself or one of its defaults; itself where none does.
+    /// The element that gives an attribute: itself or one of its defaults; itself if none does.
     fn node(&self, key: &str) -> Node<'s, 'x> {
         let mut nodes = self.nodes.iter().copied();
         nodes
@@ -91,8 +91,8 @@ impl<'s, 'x> Element<'s, 'x> {
         })
     }
 
-    /// Angles (rad) of an attribute, if given. A usual fraction of a turn to many digits is taken as exact. One rounded to
-    /// few digits is taken as written, with a note, since it fills the equations with small terms.
+    /// Angles (rad) of an attribute, if given. A common fraction of a turn with many digits is taken as exact. A
+    /// fraction rounded to few digits is taken as written, with a note, since it fills the equations with small terms.
     pub fn angles<const N: usize>(&self, key: &str) -> Result<Option<[f64; N]>, FileError> {
         let Some(mut angles) = self.numbers::<N>(key)? else {
             return Ok(None);
@@ -151,7 +151,7 @@ impl<'s, 'x> Element<'s, 'x> {
         Ok(given.normalize())
     }
 
-    /// A range in force: `switch` says so, or, where it is automatic, the range is given.
+    /// A range in force: `switch` enables it, or the switch is automatic and the range is given.
     pub fn limits(
         &self,
         range: &str,
@@ -215,10 +215,10 @@ impl<'s, 'x> Element<'s, 'x> {
     }
 }
 
-/// A difference (rad) without influence on the equations.
+/// A difference (rad) that does not affect the equations.
 const ROUNDING: f64 = 1e-10;
 
-/// The fraction of a turn that an angle is rounded from, such as a quarter turn for `1.5708`; else the angle itself.
+/// The fraction of a turn that was rounded to this angle, such as a quarter turn for `1.5708`; else the angle itself.
 fn angle_meant(word: &str, value: f64) -> f64 {
     let digits = word.split_once('.').map_or(0, |(_, digits)| digits.len());
     let fraction = match digits {

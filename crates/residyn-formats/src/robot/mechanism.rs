@@ -20,7 +20,7 @@ pub(crate) struct Mechanism {
     pub gravity: f64,
     /// The model's scheme as MuJoCo names it.
     pub integrator: &'static str,
-    /// What of the model it does not carry.
+    /// Parts of the model that it does not carry.
     pub not_carried: Vec<String>,
 }
 
@@ -65,7 +65,8 @@ impl Mechanism {
     /// The mechanism of a model.
     ///
     /// # Errors
-    /// Equations of no known mechanism, equations with time, a network in their place, or a scheme that MuJoCo lacks.
+    /// Equations of an unknown mechanism, equations that depend on time, a network in their place, or a scheme that
+    /// MuJoCo lacks.
     pub fn of(model: &ExportModel) -> Result<Self, String> {
         if model.prior.is_some() {
             return Err("a network replaces its equations".into());
@@ -97,7 +98,7 @@ impl Mechanism {
             integrator: integrator(model.integrator.scheme())?,
             not_carried: Vec::new(),
         };
-        // Behind a limit no constant torque can be added.
+        // No constant torque can be added behind a limit.
         let is_constant = |effect: &&ExportedEffect| effect.name == "constant_torque";
         let (constant, others): (Vec<_>, Vec<_>) = model.effects.iter().partition(is_constant);
         for effect in others.into_iter().chain(constant) {
@@ -179,7 +180,7 @@ impl Mechanism {
     }
 }
 
-/// The drives of a model, which are like `still` where torques are commanded.
+/// The drives of a model, all equal to `still` if torques are commanded.
 fn drives(model: &ExportModel, still: &Drive) -> Result<Vec<Drive>, String> {
     let Some(program) = model.system.drive_program() else {
         return Ok(vec![still.clone(); model.joints()]);
@@ -199,9 +200,9 @@ fn drives(model: &ExportModel, still: &Drive) -> Result<Vec<Drive>, String> {
     Ok(servos.into_iter().map(drive).collect())
 }
 
-/// For each joint the velocity (rad/s or m/s) over which dry friction reverses; 0 where it jumps.
+/// For each joint, the velocity (rad/s or m/s) over which dry friction reverses; 0 if it jumps.
 pub(crate) fn friction_widths(model: &ExportModel) -> String {
-    numbers(model.system.sign_widths())
+    numbers(model.system.smoothing_velocities())
 }
 
 /// Numbers to 15 digits, separated by blanks; rounding errors about zero become zero.

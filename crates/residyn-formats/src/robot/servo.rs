@@ -15,10 +15,10 @@ pub(super) struct Servo {
     pub limit: Option<f64>,
 }
 
-/// Command, position or velocity that every limited drive is beyond its limit at.
+/// Command, position or velocity at which every limited drive is beyond its limit.
 const FAR: f64 = 1e9;
 
-/// Points at which the form is compared with the drive, and the largest difference as a share of the torques there.
+/// Number of points at which the form is compared with the drive, and the largest difference relative to the torques.
 const POINTS: usize = 256;
 const ROUNDING: f64 = 1e-9;
 
@@ -47,7 +47,7 @@ pub(super) fn servos(
 }
 
 impl Servo {
-    /// Through single values of a joint's torque.
+    /// The form through single values of a joint's torque.
     fn through(torque: &impl Fn(&[f64]) -> f64, joints: usize, j: usize) -> Self {
         let at = |place: usize, value: f64| {
             let mut moving = vec![0.0; 3 * joints];
@@ -57,7 +57,7 @@ impl Servo {
         let constant = at(0, 0.0);
         let ends = [at(2 * joints + j, FAR), at(2 * joints + j, -FAR)];
         let largest = ends.into_iter().map(f64::abs).fold(0.0, f64::max);
-        // The difference over a step that is far from any limit, but for drives that are all limit.
+        // The difference over a step that is far from any limit, unless the drive is nothing but a limit.
         let slope = |place: usize| (at(place, 1e-6) - at(place, -1e-6)) / 2e-6;
         let gain = slope(2 * joints + j);
         let is_limited = largest < 0.5 * gain.abs() * FAR;
@@ -75,7 +75,7 @@ impl Servo {
         self.limit.map_or(free, |limit| free.clamp(-limit, limit))
     }
 
-    /// Whether the form gives the drive's torque wherever the joints are, move and are commanded to.
+    /// Whether the form gives the drive's torque at any positions, velocities and commands.
     fn is_same(&self, torque: &impl Fn(&[f64]) -> f64, joints: usize, j: usize) -> bool {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         (0..POINTS).all(|point| {

@@ -16,7 +16,7 @@ pub(crate) struct Hinge {
     pub name: String,
     /// Position in the file, bytes.
     pub at: usize,
-    /// Rather than turns; or why it does neither.
+    /// Whether it slides rather than turns; or why it does neither.
     pub slides: Result<bool, FileError>,
     /// A unit vector.
     pub axis: Vector3<f64>,
@@ -44,7 +44,7 @@ pub(crate) struct Body {
     pub at: usize,
     /// In the frame of the parent, joints at their references.
     pub pose: Pose,
-    /// From the parent outwards; none where it is welded to the parent.
+    /// From the parent outwards; none if it is welded to the parent.
     pub joints: Vec<Hinge>,
     /// In the body's own frame, or what is wrong with it.
     pub inertia: Result<Inertia, FileError>,
@@ -52,7 +52,7 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    /// Joints that follow no other, on the longest branch.
+    /// Number of joints on the longest branch that follow no other.
     fn depth(&self) -> usize {
         let own = self.joints.iter().filter(|hinge| hinge.mimics.is_none());
         let below = self.children.iter().map(Self::depth).max();
@@ -71,8 +71,8 @@ impl Body {
     }
 }
 
-/// The joints from the base to the body `tip`, or without one to the end of the longest branch. What hangs on other branches
-/// is welded where the file draws it, with a note.
+/// The joints from the base to the body `tip`, by default to the end of the longest branch. Bodies on other branches
+/// are welded where the file draws them, with a note.
 ///
 /// # Errors
 /// An unknown tip, several branches of the greatest length, no joint or too many, joints that move no inertia, a joint that
@@ -128,7 +128,7 @@ fn path_to<'b>(source: &Source<'_>, base: &'b Body, tip: &str) -> Result<Vec<&'b
     Ok(path)
 }
 
-/// The bodies from the base to the last one of the branch with most joints.
+/// The bodies from the base to the end of the branch with the most joints.
 fn longest<'b>(source: &Source<'_>, base: &'b Body) -> Result<Vec<&'b Body>, FileError> {
     let mut path = vec![base];
     while let Some(last) = path.last() {
@@ -143,14 +143,14 @@ fn longest<'b>(source: &Source<'_>, base: &'b Body) -> Result<Vec<&'b Body>, Fil
                 last.name, next.name, other.name, last.name
             );
             let error = source.error_at(other.at, message);
-            return Err(error.mended_by(FileRemedy::Tip));
+            return Err(error.remedied_by(FileRemedy::Tip));
         }
         path.push(next);
     }
     Ok(path)
 }
 
-/// A name with characters of file names and columns alone.
+/// A name with only the characters of file names and columns.
 pub(crate) fn plain(name: &str) -> String {
     let plain = |c: char| {
         if c.is_alphanumeric() || c == '-' {
@@ -168,12 +168,12 @@ struct Growth<'t, 's, 'x> {
     /// The bodies from the base to the tip.
     path: Vec<&'t Body>,
     joints: Vec<Joint>,
-    /// Where they come from.
+    /// The hinges that the joints come from.
     hinges: Vec<&'t Hinge>,
 }
 
 impl<'t> Growth<'t, '_, '_> {
-    /// Add a body of the path and its descendants; `parent` is its parent's frame in that of the last joint.
+    /// Add a body of the path and its descendants; `parent` is its parent's frame in the frame of the last joint.
     fn grow(&mut self, body: &'t Body, parent: &Pose) -> Result<(), FileError> {
         let mut frame = parent.then(&body.pose);
         for hinge in &body.joints {
@@ -183,7 +183,7 @@ impl<'t> Growth<'t, '_, '_> {
                     hinge.name
                 );
                 let error = self.source.error_at(hinge.at, message);
-                return Err(error.mended_by(FileRemedy::Tip));
+                return Err(error.remedied_by(FileRemedy::Tip));
             }
             let own = Pose {
                 rotation: with_z_along(hinge.axis),
@@ -219,7 +219,8 @@ impl<'t> Growth<'t, '_, '_> {
         children.try_for_each(|child| self.weld(child, &frame))
     }
 
-    /// Add a body's inertia to what the last joint moves, if one does; `frame` is the body's frame in that of the joint.
+    /// Add a body's inertia to what the last joint moves, if there is a joint; `frame` is the body's frame in the
+    /// joint's.
     fn take(&mut self, body: &Body, frame: &Pose) -> Result<(), FileError> {
         if let Some(last) = self.joints.last_mut() {
             let own = body.inertia.clone()?;
@@ -242,7 +243,7 @@ impl<'t> Growth<'t, '_, '_> {
                     hinge.name, mimics.leader
                 );
                 let error = self.source.error_at(hinge.at, message);
-                return Err(error.mended_by(FileRemedy::Tip));
+                return Err(error.remedied_by(FileRemedy::Tip));
             };
             if hinge.drivetrain != Drivetrain::default() {
                 let note = format!(

@@ -13,14 +13,14 @@ use residyn_core::model::chain::{
 };
 use residyn_core::model::{FileError, FileRemedy, FittedEffect, Library, Model};
 
-/// What a model changes on a joint of the description and on the body that it moves.
+/// A model's changes to a joint of the description and to the body that it moves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
-    /// The joint, as the file has it.
+    /// The joint, as the file names it.
     pub joint: String,
     /// Only damping, friction and armature differ from the file's.
     pub drivetrain: Drivetrain,
-    /// What its body has in addition, in the body's own frame.
+    /// Inertia added to its body, in the body's frame.
     pub added: Inertia,
 }
 
@@ -28,30 +28,30 @@ pub struct Change {
 #[derive(Debug, Clone, PartialEq)]
 pub struct WrittenBack {
     pub text: String,
-    /// What of the model the format cannot hold.
+    /// Parts of the model that the format cannot hold.
     pub not_carried: Vec<String>,
 }
 
-/// Effects that drivetrains hold: their one parameter is a number of the joint.
+/// Effects that drivetrains hold: their one parameter is an attribute of the joint.
 const DAMPING: &str = "viscous_friction";
 const FRICTION: &str = "coulomb_friction";
 const ROTOR: &str = "rotor_inertia";
 
-/// Largest difference of the two equations of a joint, relative to the largest of its accelerations.
+/// Largest difference between the two accelerations of a joint, relative to the largest acceleration.
 const ROUNDING: f64 = 1e-9;
 
-/// The file that a model was made from, with the model's inertias, damping, dry friction and rotors in place of its own. All
-/// else in it stays as it is. `tip` is the last link, as it was given when the model was made.
+/// The file that a model was made from, with the model's inertias, damping, dry friction and rotors in place of its
+/// own. Everything else in it stays as it is. `tip` is the last link, as given when the model was made.
 ///
 /// # Errors
-/// A file that cannot be read, of no known format, or that the model was not made from: other joints, other parameters or
-/// other equations; values that no body has.
+/// A file that cannot be read, has an unknown format, or is not the one that the model was made from: other joints,
+/// parameters or equations; values that no body can have.
 pub fn write_back(model: &Model, file: &Path, tip: Option<&str>) -> Result<WrittenBack, FileError> {
     let format = format(file)?;
     let robots = format.robots.as_ref().expect("it was found by what it has");
     let chain = (robots.read)(file, tip)?;
     let refused = |message: String| FileError::new(file, None, message);
-    let of_other_file = |message| refused(message).mended_by(FileRemedy::Tip);
+    let of_other_file = |message| refused(message).remedied_by(FileRemedy::Tip);
     let model = model.absorbed();
     check_joints(&model, &chain).map_err(of_other_file)?;
     let library = Library::built_in();
@@ -113,7 +113,7 @@ fn check_joints(model: &Model, chain: &Chain) -> Result<(), String> {
     ))
 }
 
-/// Refuse a file of other equations: the model's own and the file's have to give the same accelerations for the same values.
+/// Refuse a file with other equations: the model's and the file's must give the same accelerations for the same values.
 fn check_equations(model: &Model, declared: &Model) -> Result<(), String> {
     let bare = |model: &Model| model.without_drive().with_effects(Vec::new()).dynamics();
     let [own, of_file] = [model, declared].map(bare);
@@ -157,7 +157,7 @@ fn changes(model: &Model, declared: &Model, chain: &Chain, added: &[Inertia]) ->
     let drivetrain = |joint: &residyn_core::model::chain::Joint, number: Joint| Drivetrain {
         damping: sum(model, DAMPING, number),
         friction: sum(model, FRICTION, number),
-        // Of a short chain some rotors are a part of other parameters.
+        // In a short chain, some rotors are part of other parameters.
         armature: joint.drivetrain.armature + sum(model, ROTOR, number)
             - sum(declared, ROTOR, number),
         ..joint.drivetrain
@@ -175,14 +175,14 @@ fn changes(model: &Model, declared: &Model, chain: &Chain, added: &[Inertia]) ->
         .collect()
 }
 
-/// The values of all effects of a name on a joint together.
+/// The sum of the values of all effects with this name on a joint.
 fn sum(model: &Model, name: &str, joint: Joint) -> f64 {
     let effects = model.effects.iter();
     let own = effects.filter(|effect| effect.effect.name == name && effect.joint == joint);
     own.map(|effect| effect.values[0].0).sum()
 }
 
-/// The effects that neither the format holds nor the file had before.
+/// The effects that the format cannot hold and the file did not have before.
 fn not_carried(model: &Model, declared: &Model, held: &[&str]) -> Vec<String> {
     let is_in_file = |effect: &FittedEffect| {
         let same_values = |other: &FittedEffect| {
@@ -216,7 +216,7 @@ fn not_carried(model: &Model, declared: &Model, held: &[&str]) -> Vec<String> {
 /// The body of `link` with what is added: mass, centre of mass, and the tensor about it in the axes of the body.
 ///
 /// # Errors
-/// What no body has.
+/// Values that no body can have.
 pub(crate) fn body(
     source: &Source<'_>,
     link: Node<'_, '_>,

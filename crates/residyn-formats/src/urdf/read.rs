@@ -12,11 +12,11 @@ use residyn_core::limits::XML_DEPTH;
 use residyn_core::model::FileError;
 use residyn_core::model::chain::{Chain, Drivetrain, Inertia, Pose, turn};
 
-/// The format does not contain gravity: m/s^2, against z.
+/// Gravity, which the format does not contain: m/s^2, against z.
 const GRAVITY: f64 = 9.81;
 
-/// Read the serial chain from the root of a URDF file to the link `tip`, without one to the end of the longest branch. Gravity
-/// acts against z of the root link.
+/// Read the serial chain from the root of a URDF file to the link `tip`, by default to the end of the longest branch.
+/// Gravity acts against z of the root link.
 ///
 /// # Errors
 /// An unreadable file, invalid XML, or anything but a serial chain of revolute, continuous or prismatic joints: with
@@ -46,11 +46,11 @@ pub fn read_urdf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
 pub(super) struct Robot<'s, 'x> {
     pub source: &'s Source<'x>,
     root: Node<'s, 'x>,
-    /// By their names, of several of one name the first.
+    /// By name; the first, if several share a name.
     links: HashMap<&'s str, Node<'s, 'x>>,
 }
 
-/// The joints that hang on each link, in the order of the file.
+/// The joints attached to each link, in the order of the file.
 type JointsBelow<'s, 'x> = HashMap<NodeId, Vec<Node<'s, 'x>>>;
 
 impl<'s, 'x> Robot<'s, 'x> {
@@ -69,7 +69,7 @@ impl<'s, 'x> Robot<'s, 'x> {
         })
     }
 
-    /// The joint of a name.
+    /// The joint with this name.
     pub fn joint(&self, name: &str) -> Result<Node<'s, 'x>, FileError> {
         let mut joints = named(self.root, "joint");
         joints
@@ -128,7 +128,7 @@ impl<'s, 'x> Robot<'s, 'x> {
         Ok(below)
     }
 
-    /// A link with all its descendants, attached by `joint`, behind so many others.
+    /// A link with all its descendants, attached by `joint`, `depth` joints from the root.
     fn body(
         &self,
         link: Node<'s, 'x>,
@@ -218,7 +218,7 @@ impl<'s, 'x> Robot<'s, 'x> {
         Ok(Inertia::central(mass, tensor, &self.pose(inertial)?))
     }
 
-    /// A joint that moves; none where it is fixed.
+    /// A joint that moves; none if it is fixed.
     fn hinge(&self, joint: Node<'s, 'x>) -> Result<Option<Hinge>, FileError> {
         let (source, element) = (self.source, self.source.element(joint));
         let name = element.required_text("name")?;
@@ -292,7 +292,7 @@ impl<'s, 'x> Robot<'s, 'x> {
         Ok((effort > 0.0).then_some(effort))
     }
 
-    /// Note everything else in the file that acts on the motion.
+    /// Note everything else in the file that affects the motion.
     fn note_the_rest(&self) {
         let source = self.source;
         let all = || self.root.descendants();

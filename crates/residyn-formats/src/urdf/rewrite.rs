@@ -16,7 +16,7 @@ use residyn_core::model::chain::{Drivetrain, Inertia};
 /// The text of the file at `path` with these changes.
 ///
 /// # Errors
-/// A file that is not read, or values that no body has.
+/// A file that cannot be read, or values that no body can have.
 pub fn rewrite(path: &Path, changes: &[Change]) -> Result<String, FileError> {
     let text = xml::text(path)?;
     let source = Source::new(path, &text)?;

@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::{Predictions, Samples};
 
-/// What reads a written model and predicts from it.
+/// A client reads a written model and predicts from it.
 #[derive(Debug)]
 pub enum Client {
     /// A Python program with packages that users of the format have.
@@ -25,7 +25,7 @@ pub enum ClientError {
     /// There is no client on this machine: what to install, or why there is none.
     #[error("{0}")]
     Unavailable(String),
-    /// There is nothing to compare with: where the model itself leaves the finite numbers.
+    /// There is nothing to compare with: the place where the model's own prediction is not finite.
     #[error("{0}")]
     NotFinite(String),
     /// The client's own message about the file.
@@ -44,7 +44,7 @@ pub struct PythonClient {
 }
 
 impl Client {
-    /// What the model in `path` predicts.
+    /// The predictions of the model in `path`.
     ///
     /// # Errors
     /// No client available, or one that fails on the file.
@@ -58,8 +58,8 @@ impl Client {
 }
 
 impl PythonClient {
-    /// Run it as `python SCRIPT FILE QUESTION.json`; it prints its answer as JSON, [`Predictions`] at [`Samples`] say. The
-    /// interpreter is `$RESIDYN_PYTHON`, else `python3`.
+    /// Run it as `python SCRIPT FILE QUESTION.json`; it prints its answer as JSON, for example [`Predictions`] at
+    /// [`Samples`]. The interpreter is `$RESIDYN_PYTHON`, else `python3`.
     ///
     /// # Errors
     /// No interpreter, a missing package, or a file that the script cannot read.

@@ -8,16 +8,16 @@ use residyn_core::model::Dynamics;
 
 /// Number of sample points.
 const POINTS: usize = 256;
-/// Length of the rollout, in s,
+/// Length of the rollout, in s.
 const ROLLOUT_S: f64 = 5.0;
-/// and its steps at most.
+/// Largest number of steps of the rollout.
 const ROLLOUT_STEPS: f64 = 5000.0;
 /// Steps of the rollout over which a torque stays constant.
 const HOLD: usize = 5;
 /// Range of the rollout's torques and start velocities, relative to that of the points.
 const ROLLOUT_RANGE: f64 = 0.1;
-/// Candidate rollouts, of which the one least sensitive to its start is taken: where motion is chaotic, two clients
-/// show nothing but their rounding.
+/// Number of candidate rollouts; the one least sensitive to its start is taken: in chaotic motion, two clients differ
+/// only by their rounding.
 const ROLLOUTS: usize = 16;
 /// Change of the start by which the sensitivity is measured, relative to the range of the points.
 const PERTURBATION: f64 = 1e-6;
@@ -62,7 +62,7 @@ fn held_torques(step_s: f64, range: &[f64], rng: &mut impl Rng) -> Vec<Vec<f64>>
     (0..steps).map(|k| pieces[k / HOLD].clone()).collect()
 }
 
-/// The start whose rollout a small change of it changes least.
+/// The start whose rollout is least changed by a small change of the start.
 fn least_sensitive(
     model: &ReferenceModel,
     mut starts: Vec<Vec<f64>>,
@@ -99,7 +99,7 @@ fn single(number: f64) -> f64 {
 }
 
 /// For each joint the torque that changes its acceleration as much as the state does without torque (root mean square);
-/// 1 where nothing accelerates, or the torque has no effect.
+/// 1 if nothing accelerates, or the torque has no effect.
 fn torque_range(whole: &Dynamics, states: &[Vec<f64>]) -> Vec<f64> {
     let n = whole.joints;
     let values = whole.values();

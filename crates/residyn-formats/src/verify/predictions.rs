@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ClientError, Samples};
 
-/// What a client predicts at [`Samples`](super::Samples). What a format does not offer is left out.
+/// A client's predictions at [`Samples`](super::Samples). Those that a format does not offer are left out.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Predictions {
     /// `[point][2n]`: the state after one step from each point.
@@ -25,10 +25,10 @@ pub struct Difference {
 }
 
 impl Predictions {
-    /// Refuse steps and derivatives that are no finite numbers: nothing could be compared with them.
+    /// Refuse steps and derivatives that are not finite: nothing could be compared with them.
     ///
     /// # Errors
-    /// Where the first of them is.
+    /// The first one that is not finite.
     pub fn check_finite(&self, samples: &Samples) -> Result<(), ClientError> {
         let step = format!("a step of {:?} s", samples.step_s);
         for (rows, what) in [
@@ -46,7 +46,7 @@ impl Predictions {
         Ok(())
     }
 
-    /// The same without a rollout that leaves the finite numbers, and the step in which it does.
+    /// The predictions without a rollout that ceases to be finite, and the step in which it does.
     pub fn without_lost_rollout(mut self) -> (Self, Option<usize>) {
         let lost = (self.rollout.iter().flatten()).position(|row| !is_finite(row));
         if lost.is_some() {
@@ -55,7 +55,7 @@ impl Predictions {
         (self, lost)
     }
 
-    /// How far `other` is from these; infinite where it has another number of rows, or a NaN.
+    /// How far `other` is from these predictions; infinite if it has another number of rows, or a NaN.
     pub fn difference(&self, other: &Self) -> Difference {
         let between = |mine: &Option<Vec<Vec<f64>>>, theirs: &Option<Vec<Vec<f64>>>| {
             Some(difference(mine.as_ref()?, theirs.as_ref()?))
@@ -73,7 +73,7 @@ fn is_finite(row: &[f64]) -> bool {
 }
 
 impl Difference {
-    /// The larger of the differences of steps and derivatives, which no rollout has amplified.
+    /// The larger of the step and derivative differences, which no rollout amplifies.
     pub fn pointwise(&self) -> f64 {
         let both = [self.next, self.derivative].into_iter().flatten();
         both.fold(0.0, f64::max)

@@ -10,7 +10,8 @@ pub struct Samples {
     pub step_s: f64,
     /// `[point][2n]`: positions, then velocities.
     pub states: Vec<Vec<f64>>,
-    /// `[point][n]`: torques held for a step. For a step they are commanded after no torque; for the derivative they act.
+    /// `[point][n]`: torques held for a step. For a step, they are commanded after zero torque; for the derivative,
+    /// they act.
     pub torques: Vec<Vec<f64>>,
     /// `[2n]`: state at the start of the rollout, at time 0 and after no torque.
     pub start: Vec<f64>,

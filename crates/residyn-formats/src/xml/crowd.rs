@@ -5,11 +5,11 @@ use std::path::Path;
 use residyn_core::limits::{XML_ATTRIBUTES, XML_DEPTH};
 use residyn_core::model::FileError;
 
-/// Refuses a text in which an element has too many attributes, too many namespaces have names, or elements lie too deep within
-/// each other: before it is parsed, and whether or not it is XML.
+/// Refuses a text in which an element has too many attributes, too many namespaces have names, or elements are nested
+/// too deeply: before it is parsed, and whether or not it is XML.
 ///
 /// # Errors
-/// Such a place.
+/// The place of the excess.
 pub(super) fn check(path: &Path, text: &str) -> Result<(), FileError> {
     let crowded = |at: usize, message: String| {
         let before = &text[..at];
@@ -38,7 +38,7 @@ pub(super) fn check(path: &Path, text: &str) -> Result<(), FileError> {
     Ok(())
 }
 
-/// What begins with `<`, to its end.
+/// Markup that begins with `<`, to its end.
 #[derive(Default)]
 struct Tag {
     /// Bytes.
@@ -107,7 +107,7 @@ impl Tag {
 mod tests {
     use super::check;
 
-    fn told(text: &str) -> Option<String> {
+    fn message(text: &str) -> Option<String> {
         check("a.xml".as_ref(), text)
             .err()
             .map(|error| error.to_string())
@@ -119,15 +119,19 @@ mod tests {
         let attributes = many(&|k| format!(" b{k}='>\n<a \"'"));
         let crowded = format!("<r>\n<!-- {attributes} -->\n <a{attributes}/></r>");
         assert!(
-            told(&crowded)
+            message(&crowded)
                 .unwrap()
                 .starts_with("a.xml, line 204, column 2: more than 200")
         );
         let namespaces = many(&|k| format!("<a xmlns:b{k}='c'/>"));
-        assert!(told(&namespaces).unwrap().contains("names of namespaces"));
+        assert!(
+            message(&namespaces)
+                .unwrap()
+                .contains("names of namespaces")
+        );
         let deep = "<a b='/>'>".repeat(201);
         assert!(
-            told(&deep)
+            message(&deep)
                 .unwrap()
                 .contains("within more than 200 elements")
         );
@@ -142,7 +146,7 @@ mod tests {
             "</",
             "<!--",
         ] {
-            assert_eq!(told(sound), None, "{sound}");
+            assert_eq!(message(sound), None, "{sound}");
         }
     }
 }

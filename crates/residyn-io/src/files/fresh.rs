@@ -8,22 +8,22 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempPath;
 
-/// A file that becomes another once it is whole. It is called `.NAME.tmp` until then, and locked, so that two processes
-/// write it one after the other; and it is removed where that does not come.
+/// A file that replaces another once it is complete. Until then it is called `.NAME.tmp` and locked, so that two
+/// processes write it one after the other; if it is never completed, it is removed.
 pub(super) struct Fresh {
     pub file: File,
     path: TempPath,
 }
 
 impl Fresh {
-    /// An empty file beside `target`.
+    /// An empty file next to `target`.
     ///
     /// # Errors
     /// A folder that cannot be written.
     pub fn beside(target: &Path) -> io::Result<Self> {
         let path = hidden_beside(target, ".tmp");
         loop {
-            // Made anew: where a link has the name, it is not followed.
+            // Created anew: a link of this name is not followed.
             let made = OpenOptions::new().write(true).create_new(true).open(&path);
             let file = match made {
                 Ok(file) => file,
@@ -37,7 +37,7 @@ impl Fresh {
                 let _ = fs::remove_file(&path);
                 return Err(error);
             }
-            // Between the two, another process may have taken it for what a killed one left.
+            // Between creating and locking it, another process may have taken it for a leftover.
             if is_at(&file, &path)? {
                 let path = TempPath::try_from_path(path)?;
                 return Ok(Self { file, path });
@@ -45,10 +45,10 @@ impl Fresh {
         }
     }
 
-    /// Give it the name of the file that it is to be.
+    /// Rename it to the file that it is to be.
     ///
     /// # Errors
-    /// A file system that fails; the file is removed then.
+    /// A file system error; the file is then removed.
     pub fn become_file(self, target: &Path) -> io::Result<()> {
         self.file.sync_all()?;
         fs::rename(&self.path, target)?;
@@ -57,7 +57,7 @@ impl Fresh {
     }
 }
 
-/// Remove a file that a killed process left. One that is being written is waited for.
+/// Remove a file that a killed process left. If it is being written, wait for that.
 fn remove_left(path: &Path) -> io::Result<()> {
     match File::open(path) {
         Ok(left) => {
@@ -76,12 +76,12 @@ fn remove_left(path: &Path) -> io::Result<()> {
     }
 }
 
-/// A folder that becomes another once it is whole: `.NAME.new` beside it until then. It is removed with all that is in it
-/// where that does not come.
+/// A folder that replaces another once it is complete: `.NAME.new` next to it until then. If it is never completed, it
+/// is removed with its contents.
 pub struct FreshFolder(PathBuf);
 
 impl FreshFolder {
-    /// An empty folder. Whoever makes it owns `target`: what is there of its name was left by a killed program.
+    /// An empty folder. The caller owns `target`: an existing folder of this name was left by a killed program.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -100,12 +100,12 @@ impl FreshFolder {
 
 impl Drop for FreshFolder {
     fn drop(&mut self) {
-        // What stays is removed by whoever makes it next.
+        // If it stays, the next process that makes it removes it.
         let _ = remove_folder(&self.0);
     }
 }
 
-/// Remove a folder where there is one.
+/// Remove a folder if it exists.
 ///
 /// # Errors
 /// A folder that cannot be removed.
@@ -116,7 +116,7 @@ pub fn remove_folder(path: &Path) -> io::Result<()> {
     }
 }
 
-/// The hidden name of what belongs to `path`, in the same folder: `.NAME` and the ending.
+/// The hidden name of a file or folder that belongs to `path`, in the same folder: `.NAME` and the ending.
 pub fn hidden_beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = OsString::from(".");
     name.push(path.file_name().unwrap_or_default());
@@ -139,7 +139,7 @@ pub fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-/// Elsewhere a file that is open keeps its name.
+/// On other systems an open file keeps its name.
 #[cfg(not(unix))]
 pub fn is_at(_: &File, _: &Path) -> io::Result<bool> {
     Ok(true)

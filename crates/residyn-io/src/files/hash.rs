@@ -5,8 +5,8 @@ use sha2::{Digest, Sha256};
 
 use super::open;
 
-/// A 64-bit hash of contents (FNV-1a), the same on every machine and in every version. It tells changed contents from
-/// unchanged ones; it does not protect against forgery.
+/// A 64-bit hash of contents (FNV-1a), the same on every machine and in every version. It distinguishes changed from
+/// unchanged contents; it does not protect against forgery.
 pub fn content_hash(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
@@ -18,7 +18,8 @@ pub fn content_id(bytes: &[u8]) -> String {
     format!("{:016x}", content_hash(bytes))
 }
 
-/// The SHA-256 of contents in hexadecimal digits, as `sha256sum` prints it: by it others find the file that was read.
+/// The SHA-256 of contents in hexadecimal digits, as `sha256sum` prints it, so that others can find the file that was
+/// read.
 pub fn sha256(bytes: &[u8]) -> String {
     format!("{:x}", Sha256::digest(bytes))
 }

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use residyn_core::limits::{SAVED_BYTES, TEXT_BYTES};
 
-/// The regular file that `path` leads to. What is none, a pipe say, may never begin or never end.
+/// The regular file that `path` leads to. Anything else, such as a pipe, may never begin or never end.
 ///
 /// # Errors
-/// What is not there or cannot be opened, and what is no regular file.
+/// A file that does not exist, cannot be opened or is not a regular file.
 pub fn open(path: &Path) -> io::Result<File> {
     let found = fs::metadata(path).map_err(|error| match path.to_str() {
         Some("-") => invalid(
@@ -15,7 +15,7 @@ pub fn open(path: &Path) -> io::Result<File> {
         ),
         _ => error,
     })?;
-    // Asked before it is opened: to open a pipe waits for who writes into it.
+    // Checked before opening, since opening a pipe waits for a writer.
     if !found.is_file() {
         return Err(invalid(&format!(
             "it is {}, not a regular file",
@@ -25,7 +25,7 @@ pub fn open(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// How long a regular file is \[bytes\].
+/// The length of a regular file \[bytes\].
 ///
 /// # Errors
 /// As [`open`].
@@ -36,7 +36,7 @@ pub fn size(path: &Path) -> io::Result<u64> {
 /// The text of a file that people write.
 ///
 /// # Errors
-/// As [`open`]; a file that is longer than [`TEXT_BYTES`] or no UTF-8.
+/// As [`open`]; a file that is longer than [`TEXT_BYTES`] or not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     let bytes = read(path, TEXT_BYTES)?;
     String::from_utf8(bytes)
@@ -60,7 +60,7 @@ fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     }
 }
 
-/// What is no regular file, with its article.
+/// The kind of a file that is not regular, with its article.
 pub(super) fn kind(found: &Metadata) -> &'static str {
     match found.is_dir() {
         true => "a folder",
@@ -85,14 +85,17 @@ mod tests {
         fs::write(&path, "text").unwrap();
         assert_eq!(read_text(&path).unwrap(), "text");
         assert_eq!(read(&path, 4).unwrap(), b"text");
-        let told = read(&path, 3).unwrap_err().to_string();
-        assert_eq!(told, "it has more than 0 MB");
+        let message = read(&path, 3).unwrap_err().to_string();
+        assert_eq!(message, "it has more than 0 MB");
         fs::write(&path, [b'a', 0xff]).unwrap();
         assert!(read_text(&path).unwrap_err().to_string().contains("utf-8"));
-        let told = open(folder.path()).unwrap_err().to_string();
-        assert_eq!(told, "it is a folder, not a regular file");
-        let told = open("-".as_ref()).unwrap_err().to_string();
-        assert!(told.starts_with("standard input is not read"), "{told}");
+        let message = open(folder.path()).unwrap_err().to_string();
+        assert_eq!(message, "it is a folder, not a regular file");
+        let message = open("-".as_ref()).unwrap_err().to_string();
+        assert!(
+            message.starts_with("standard input is not read"),
+            "{message}"
+        );
     }
 
     #[test]
@@ -104,8 +107,8 @@ mod tests {
         assert!(made.unwrap().success());
         std::os::unix::fs::symlink("/dev/zero", &device).unwrap();
         for path in [pipe, device] {
-            let told = read_text(&path).unwrap_err().to_string();
-            assert_eq!(told, "it is a device or a pipe, not a regular file");
+            let message = read_text(&path).unwrap_err().to_string();
+            assert_eq!(message, "it is a device or a pipe, not a regular file");
         }
     }
 }

@@ -9,7 +9,7 @@ pub fn beside(path: &Path, file: &Path) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(file)
 }
 
-/// `file` as the file at `path` names it or, where that is a plain name and no such file is there, the name as it is: that of
+/// `file` as the file at `path` names it or, if that is a plain name and no such file exists, the name itself, for
 /// something built in. A path never depends on the folder in which the program is run.
 pub fn beside_or_named(path: &Path, file: &Path) -> PathBuf {
     let beside = beside(path, file);
@@ -21,7 +21,7 @@ pub fn beside_or_named(path: &Path, file: &Path) -> PathBuf {
     }
 }
 
-/// The text of the file at `path` or, where there is no file, the embedded text of that name.
+/// The text of the file at `path` or, if there is no file, the embedded text of that name.
 ///
 /// # Errors
 /// Neither exists, or the file cannot be read.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::fresh::{Fresh, hidden_beside, remove_folder};
 use super::input::kind;
 
-/// As many as Linux follows.
+/// As many links as Linux follows.
 const MOST_LINKS: usize = 40;
 
 /// An output file that cannot be written. What was there before is unchanged, and no part of the new file is left.
@@ -17,17 +17,17 @@ pub struct OutputError {
 }
 
 impl OutputError {
-    /// The error of `path` that the system reports.
+    /// The system's error for `path`.
     pub fn of(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self { path, source }
     }
 }
 
-/// What a run may write, as far as that is known before it \[bytes\].
+/// What a run may write, as far as known in advance \[bytes\].
 const ROOM: usize = 4 << 20;
 
-/// Look whether results can be written to `path`, a file or a folder that need not exist, before they are computed.
+/// Check that results can be written to `path`, a file or a folder that need not exist, before they are computed.
 ///
 /// # Errors
 /// A folder that cannot be written, or that has no room.
@@ -45,7 +45,7 @@ pub fn check_room(path: &Path) -> Result<(), OutputError> {
 /// links are followed, so that the file that a link points to is written and the link stays.
 ///
 /// # Errors
-/// A folder that does not exist or cannot be written, a full disk, or a `path` that is no regular file (a folder, a
+/// A folder that does not exist or cannot be written, a full disk, or a `path` that is not a regular file (a folder, a
 /// device, a pipe).
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), OutputError> {
     write_with(path, |file| file.write_all(contents))
@@ -77,11 +77,11 @@ pub fn write_with(
 }
 
 /// Move all files and folders in the folder `from` into the folder `to`: each file as [`write_whole`] would write it
-/// there, each folder in place of the one of its name. Either all of them have somewhere to go, or none is moved. Where `to`
-/// does not exist yet, `from` becomes it, all at once.
+/// there, each folder replacing the one of its name. Either all of them can be placed, or none is moved. If `to` does
+/// not exist yet, `from` is renamed to it, all at once.
 ///
 /// # Errors
-/// A file whose place is taken by what is no regular file, a folder whose place is taken by a file, or as
+/// A file whose place is taken by something other than a regular file, a folder whose place is taken by a file, or as
 /// [`write_whole`].
 pub fn move_contents(from: &Path, to: &Path) -> Result<(), OutputError> {
     let to = &end_of_links(to);
@@ -119,14 +119,14 @@ fn check_target(from: &Path, to: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// A folder is moved away before another takes its place, so that none has its name of which a part is removed.
+/// A folder is moved away before another takes its place, so that a partly removed folder never has its name.
 fn replace_folder(from: &Path, to: &Path) -> io::Result<()> {
     let older = hidden_beside(from, ".old");
     if to.is_dir() {
         fs::rename(to, &older)?;
     }
     if let Err(error) = fs::rename(from, to) {
-        // There is nothing better to do where this fails, too.
+        // If this fails too, there is nothing better to do.
         let _ = fs::rename(&older, to);
         return Err(error);
     }
@@ -144,14 +144,14 @@ fn move_file(from: &Path, to: &Path) -> Result<(), OutputError> {
     }
 }
 
-/// The folder that `path` is in; `.` for a name alone.
+/// The folder that contains `path`; `.` for a bare name.
 pub fn folder_of(path: &Path) -> &Path {
     path.parent()
         .filter(|folder| !folder.as_os_str().is_empty())
         .unwrap_or(Path::new("."))
 }
 
-/// The regular file, be it one that does not exist yet, that `path` leads to when links are followed.
+/// The regular file, which need not exist yet, that `path` leads to when links are followed.
 fn target_of(path: &Path) -> io::Result<PathBuf> {
     match fs::metadata(path) {
         Ok(found) if found.is_file() => fs::canonicalize(path),
@@ -164,7 +164,7 @@ fn target_of(path: &Path) -> io::Result<PathBuf> {
     }
 }
 
-/// Where `path` leads when links are followed, also where they end at nothing. Links that form a loop are followed for a
+/// Where `path` leads when links are followed, even if they end at nothing. Links that form a loop are followed for a
 /// while; whoever uses the result gets the system's error.
 pub fn end_of_links(path: &Path) -> PathBuf {
     let mut at = path.to_owned();
@@ -192,8 +192,8 @@ mod tests {
             file.write_all(b"half")?;
             Err(io::Error::other("the disk is full"))
         });
-        let told = broken.unwrap_err().to_string();
-        assert!(told.ends_with("a.txt: cannot be written: the disk is full"));
+        let message = broken.unwrap_err().to_string();
+        assert!(message.ends_with("a.txt: cannot be written: the disk is full"));
         assert_eq!(fs::read(&path).unwrap(), b"first");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         let missing = write_whole(&folder.path().join("none/a.txt"), b"").unwrap_err();

@@ -16,8 +16,8 @@ const RECORD: &str = "run.json";
 
 /// The folder of a run: one run at a time works in it, and a run that was interrupted goes on in it.
 ///
-/// It is locked until all copies are dropped or the process ends, however that comes. The lock is a file beside the
-/// folder, `.NAME.lock`, since a checkpoint replaces the whole folder.
+/// It is locked until all copies are dropped or the process ends for any reason. The lock is a file next to the folder,
+/// `.NAME.lock`, since a checkpoint replaces the whole folder.
 #[derive(Debug, Clone)]
 pub struct RunFolder {
     path: PathBuf,
@@ -55,7 +55,7 @@ struct Record {
 }
 
 impl RunFolder {
-    /// Lock the folder `path`. It need not exist yet; the folder that it is in is made.
+    /// Lock the folder `path`. It need not exist yet; its parent folder is made.
     ///
     /// # Errors
     /// Another run works there, `path` is a file, or there is no room or no permission to write in it.
@@ -105,7 +105,7 @@ impl RunFolder {
         self.lock.remove();
     }
 
-    /// Make the folder where it is missing.
+    /// Make the folder if it is missing.
     ///
     /// # Errors
     /// A folder that cannot be made.
@@ -113,7 +113,7 @@ impl RunFolder {
         fs::create_dir_all(&self.path).map_err(failed("made", &self.path))
     }
 
-    /// Record that the folder belongs to `run`, or find that it does.
+    /// Record that the folder belongs to `run`, or check that it does.
     ///
     /// # Errors
     /// The folder belongs to another run, cannot be made or written, or its record is damaged.
@@ -138,7 +138,7 @@ impl RunFolder {
         self.refuse(run.difference(saved))
     }
 
-    /// Refuse what differs in this from what is here.
+    /// Refuse a run that differs from the one here.
     pub(super) fn refuse(&self, difference: Option<String>) -> Result<(), RunFolderError> {
         difference.map_or(Ok(()), |difference| {
             Err(RunFolderError::OtherRun {
@@ -148,7 +148,7 @@ impl RunFolder {
         })
     }
 
-    /// The text of a file here; none where there is no such file.
+    /// The text of a file here; `None` if there is no such file.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -156,7 +156,7 @@ impl RunFolder {
         self.reading(name, |path| fs::read_to_string(path))
     }
 
-    /// The bytes of a file here; none where there is no such file.
+    /// The bytes of a file here; `None` if there is no such file.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -177,17 +177,17 @@ impl RunFolder {
         }
     }
 
-    /// What a JSON file here says; none where there is no such file.
+    /// The value in a JSON file here; `None` if there is no such file.
     ///
     /// # Errors
-    /// A file that cannot be read or does not say a `T`.
+    /// A file that cannot be read or does not hold a `T`.
     pub fn read<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>, RunFolderError> {
         let read = |text: String| serde_json::from_str(&text);
         let value = self.text(name)?.map(read).transpose();
         value.map_err(|error| self.damaged(name, error.to_string()))
     }
 
-    /// Write a JSON file here, whole or not at all; the folder is made where it is missing.
+    /// Write a JSON file here, whole or not at all; the folder is made if it is missing.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -196,7 +196,7 @@ impl RunFolder {
         self.write_text(name, &(json + "\n"))
     }
 
-    /// Write a text file here, whole or not at all; the folder is made where it is missing.
+    /// Write a text file here, whole or not at all; the folder is made if it is missing.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -205,7 +205,7 @@ impl RunFolder {
         Ok(write_whole(&self.path.join(name), text.as_bytes())?)
     }
 
-    /// The error of a file here that cannot be what this program wrote.
+    /// The error for a file here that this program cannot have written.
     pub fn damaged(&self, name: &str, reason: String) -> RunFolderError {
         RunFolderError::Damaged {
             path: self.path.join(name),
@@ -214,7 +214,7 @@ impl RunFolder {
     }
 }
 
-/// A process that runs.
+/// A running process, in words.
 fn named(process: Option<u32>) -> String {
     process.map_or_else(
         || "another run".to_owned(),
@@ -306,21 +306,21 @@ mod tests {
         let claim = |seed| RunFolder::open(&path).unwrap().claim(&of_seed(seed));
         claim(3).unwrap();
         claim(3).unwrap();
-        let told = claim(4).unwrap_err().to_string();
+        let message = claim(4).unwrap_err().to_string();
         assert!(
-            told.ends_with("run holds another run: its `seed` is 3, here it is 4"),
-            "{told}"
+            message.ends_with("run holds another run: its `seed` is 3, here it is 4"),
+            "{message}"
         );
         fs::write(path.join("run.json"), "{").unwrap();
-        let told = claim(3).unwrap_err().to_string();
-        assert!(told.contains("run.json is damaged: EOF"), "{told}");
+        let message = claim(3).unwrap_err().to_string();
+        assert!(message.contains("run.json is damaged: EOF"), "{message}");
     }
 
     #[test]
     fn a_file_is_no_folder() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let told = RunFolder::open(file.path()).unwrap_err().to_string();
-        assert!(told.ends_with("is a file"), "{told}");
+        let message = RunFolder::open(file.path()).unwrap_err().to_string();
+        assert!(message.ends_with("is a file"), "{message}");
         let inside = RunFolder::open(&file.path().join("a/run")).unwrap_err();
         assert!(inside.to_string().contains("cannot be made"), "{inside}");
     }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::difference::first_difference;
 
-/// What decides the numbers of a run: runs of one identity end with the same numbers.
+/// What determines a run's numbers: runs with the same identity give the same numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
     /// What is done: the name of a command or of an experiment.
@@ -19,14 +19,14 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// How this run differs from a `saved` one, in words; none where they are the same.
+    /// How this run differs from a `saved` one, in words; `None` if they are the same.
     pub fn difference(&self, saved: &Self) -> Option<String> {
         let input = || {
             let mut names = saved.inputs.keys().chain(self.inputs.keys());
             let changed = names.find(|name| saved.inputs.get(*name) != self.inputs.get(*name));
             changed.map(|name| format!("{name} has changed since"))
         };
-        // Inputs come last, since another seed or configuration changes data that are simulated.
+        // Inputs come last, since another seed or configuration changes simulated data.
         first_difference("command", &json!(saved.command), &json!(self.command))
             .or_else(|| first_difference("seed", &json!(saved.seed), &json!(self.seed)))
             .or_else(|| first_difference("", &saved.config, &self.config))
@@ -49,18 +49,18 @@ mod tests {
             inputs: [("the model file".to_owned(), hash.to_owned())].into(),
         };
         let saved = identity(0, 40, "a");
-        let told = |mine: Identity| mine.difference(&saved);
-        assert_eq!(told(saved.clone()), None);
+        let message = |mine: Identity| mine.difference(&saved);
+        assert_eq!(message(saved.clone()), None);
         assert_eq!(
-            told(identity(7, 50, "b")).unwrap(),
+            message(identity(7, 50, "b")).unwrap(),
             "its `seed` is 0, here it is 7"
         );
         assert_eq!(
-            told(identity(0, 50, "b")).unwrap(),
+            message(identity(0, 50, "b")).unwrap(),
             "its `epochs` is 40, here it is 50"
         );
         assert_eq!(
-            told(identity(0, 40, "b")).unwrap(),
+            message(identity(0, 40, "b")).unwrap(),
             "the model file has changed since"
         );
     }

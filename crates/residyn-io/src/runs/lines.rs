@@ -15,11 +15,11 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// The file of this name, which need not exist yet, and the results that are there. What a killed run left of a line is
-    /// cut off; a line of another version is no result.
+    /// The file of this name, which need not exist yet, and its results. A partial line left by a killed run is cut
+    /// off; a line of another version is not a result.
     ///
     /// # Errors
-    /// A file that cannot be read, or not be cut.
+    /// A file that cannot be read or truncated.
     pub fn open<T: DeserializeOwned>(
         folder: &RunFolder,
         name: &'static str,
@@ -40,7 +40,7 @@ impl Lines {
         Ok((file, results.collect()))
     }
 
-    /// Add a result, all of it or nothing; the folder is made where it is missing.
+    /// Add a result, all of it or nothing; the folder is made if it is missing.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -79,11 +79,11 @@ impl Lines {
 fn append(path: &Path, line: &str) -> io::Result<()> {
     let mut file = OpenOptions::new().create(true).append(true).open(path)?;
     let before = file.metadata()?.len();
-    // Some file systems tell of a full disk only when what was written is on it.
+    // Some file systems report a full disk only when the data are written to it.
     let written = file.write_all(line.as_bytes());
     let written = written.and_then(|()| file.sync_data());
     if written.is_err() {
-        // Where this fails as well, the line is cut off when the file is opened again.
+        // If this fails as well, the line is cut off when the file is opened again.
         let _ = file.set_len(before);
     }
     written

@@ -16,7 +16,7 @@ impl Lock {
     /// Take the lock whose file is `path`.
     ///
     /// # Errors
-    /// `WouldBlock` where another owner has it; a file that cannot be made or locked.
+    /// `WouldBlock` if another owner holds it; a file that cannot be made or locked.
     pub fn take(path: &Path) -> Result<Self, TryLockError> {
         loop {
             let mut options = OpenOptions::new();
@@ -24,7 +24,7 @@ impl Lock {
             let file = opened.map_err(TryLockError::Error)?;
             file.try_lock()?;
             if is_at(&file, path).map_err(TryLockError::Error)? {
-                // For people alone: without it the lock is as good.
+                // For people only: the lock works without it.
                 let _ = file.set_len(0);
                 let _ = write!(&file, "{}", std::process::id());
                 return Ok(Self {
@@ -32,12 +32,12 @@ impl Lock {
                     _file: file,
                 });
             }
-            // Its last owner removed the file between the opening and the locking; the next one of that name counts.
+            // Its last owner removed the file between the opening and the locking; the next file of that name counts.
         }
     }
 }
 
-/// The process that has the lock whose file is `path`, as far as it says.
+/// The process that holds the lock whose file is `path`, if the file names it.
 pub(super) fn owner(path: &Path) -> Option<u32> {
     fs::read_to_string(path).ok()?.parse().ok()
 }

@@ -8,7 +8,7 @@ use super::part::{Part, RECORD};
 use super::{RunFolder, RunFolderError, Shard};
 use crate::files::{OutputError, write_whole};
 
-/// What is not there yet of a run whose parts were put together.
+/// What a merged run still lacks.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Lacking {
     /// Shards that none of the parts holds.
@@ -17,7 +17,7 @@ pub struct Lacking {
     pub unfinished: Vec<(Shard, PathBuf)>,
 }
 
-/// Why parts cannot be put together. Nothing was written then, unless it was the writing that failed.
+/// Why parts cannot be merged. Nothing was written, unless the writing itself failed.
 #[derive(Debug, Error)]
 pub enum MergeError {
     #[error("{path} is no part of a run: it has no {RECORD}", path = .path.display())]
@@ -44,12 +44,12 @@ pub enum MergeError {
 /// Files by their paths within a folder, and all folders that have one.
 type Files = BTreeMap<PathBuf, Vec<PathBuf>>;
 
-/// Put the results in the `parts` of a run together in the folder `out`, where the run itself then finds them. Lines of
-/// `.jsonl` files are results by themselves, all other files are whole. What `out` holds already counts as a part, so
-/// that putting together may be repeated.
+/// Merge the results in the `parts` of a run into the folder `out`, where the run itself then finds them. Lines of
+/// `.jsonl` files are results by themselves, all other files are whole. The contents of `out` count as a part, so that
+/// merging can be repeated.
 ///
 /// # Errors
-/// A folder that is no part or is a part of another run or build, two results of one piece of work, or files that
+/// A folder that is not a part or is a part of another run or build, two results of one piece of work, or files that
 /// cannot be read or written.
 pub fn merge(parts: &[PathBuf], out: &RunFolder) -> Result<Lacking, MergeError> {
     let parts: Vec<Part> = parts
@@ -102,7 +102,7 @@ fn one_run(parts: &[Part]) -> Result<(), MergeError> {
     Ok(())
 }
 
-/// Add all files within `folder` below `at`. Those whose names begin with a dot are temporary and left by killed runs.
+/// Add all files within `folder` below `at`. Files whose names begin with a dot are temporary and left by killed runs.
 fn list(folder: &Path, at: &Path, files: &mut Files) -> Result<(), MergeError> {
     let path = folder.join(at);
     let failed = |source| MergeError::Read {
@@ -124,7 +124,7 @@ fn list(folder: &Path, at: &Path, files: &mut Files) -> Result<(), MergeError> {
     Ok(())
 }
 
-/// What the file of this name holds together.
+/// The merged contents of the file of this name.
 fn contents(name: &Path, sources: &[PathBuf]) -> Result<Vec<u8>, MergeError> {
     let read = |path: &PathBuf| {
         fs::read(path).map_err(|source| MergeError::Read {
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_or_not_done_is_told() {
+    fn what_is_missing_or_not_done_is_reported() {
         let parent = tempfile::tempdir().unwrap();
         let first = part(parent.path(), "1/3", 40, "x", &[]);
         let second = part(parent.path(), "2/3", 40, "x", &[]);
@@ -274,10 +274,10 @@ mod tests {
         };
         let first = of("a", "1/2", 40, "x", "1");
         let out = RunFolder::open(&parent.path().join("out")).unwrap();
-        let told = |other: PathBuf| {
-            let told = merge(&[first.clone(), other], &out).unwrap_err();
+        let message = |other: PathBuf| {
+            let message = merge(&[first.clone(), other], &out).unwrap_err();
             assert!(!out.path().exists());
-            told.to_string()
+            message.to_string()
         };
         let cases = [
             (
@@ -303,8 +303,8 @@ mod tests {
             (parent.path().join("none"), "is no part of a run"),
         ];
         for (other, part) in cases {
-            let told = told(other);
-            assert!(told.contains(part), "{part}: {told}");
+            let message = message(other);
+            assert!(message.contains(part), "{part}: {message}");
         }
         let working = RunFolder::open(&first).unwrap();
         let busy = merge(&[first], &out).unwrap_err();

@@ -7,7 +7,7 @@ use super::{Identity, RunFolder, RunFolderError, Shard};
 /// What a folder is a part of.
 pub(super) const RECORD: &str = "shard.json";
 
-/// The folder of a run that holds one shard of it, to be put together with the others by [`merge`](super::merge()).
+/// The folder of a run that holds one shard of it, to be merged with the others by [`merge`](super::merge()).
 #[derive(Debug)]
 pub struct Part {
     folder: RunFolder,
@@ -19,7 +19,7 @@ pub struct Part {
 pub(super) struct Record {
     /// Version of the program.
     residyn: String,
-    /// Hash of the build of the program: another one may give other numbers.
+    /// Hash of the build of the program: another build may give other numbers.
     program: String,
     #[serde(flatten)]
     run: Identity,
@@ -29,7 +29,7 @@ pub(super) struct Record {
 }
 
 impl Part {
-    /// Record that the folder holds this shard of `run`, done by this build of the `program`, or find that it does.
+    /// Record that the folder holds this shard of `run`, done by this build of the `program`, or check that it does.
     ///
     /// # Errors
     /// The folder holds something else, or cannot be written.
@@ -57,7 +57,7 @@ impl Part {
         })
     }
 
-    /// The part in a folder; none where there is none.
+    /// The part in a folder; `None` if there is none.
     ///
     /// # Errors
     /// A damaged record.
@@ -87,7 +87,7 @@ impl Part {
 }
 
 impl Record {
-    /// How the run that this is a part of differs from that of a `saved` part, in words; none where they are the same.
+    /// How the run of this part differs from the run of a `saved` part, in words; `None` if they are the same.
     pub fn difference(&self, saved: &Self) -> Option<String> {
         let build = |part: &Self| json!({"residyn": part.residyn, "program": part.program});
         first_difference("", &build(saved), &build(self))

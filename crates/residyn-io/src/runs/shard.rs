@@ -14,7 +14,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// All of a run.
+    /// The whole run.
     pub const WHOLE: Self = Self { number: 1, of: 1 };
 
     /// All shards of the run that this is one of, in order.
@@ -22,15 +22,14 @@ impl Shard {
         (1..=self.of).map(move |number| Self { number, ..self })
     }
 
-    /// Its share of the pieces of work: those a distance of the number of shards apart, since neighbours take about as
-    /// long as each other.
+    /// Its share of the pieces of work: every n-th piece for n shards, since neighbours take about equally long.
     pub fn share<T>(self, pieces: impl IntoIterator<Item = T>) -> impl Iterator<Item = T> {
         let mine = pieces.into_iter().skip(self.number - 1);
         mine.step_by(self.of)
     }
 }
 
-/// What is no shard of a run.
+/// Why a text does not name a shard.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ShardError {
     #[error("give two whole numbers as K/N, 3/8 say")]

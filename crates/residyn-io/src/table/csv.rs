@@ -1,22 +1,22 @@
 //! Text tables: CSV and its relatives.
 //!
-//! Accepted silently: a byte order mark, CRLF line ends, spaces around cells, quoted cells and blank lines. Columns are separated
-//! by what the header separates its names by; decimal commas are read where that is no comma.
+//! Accepted silently: a byte order mark, CRLF line ends, spaces around cells, quoted cells and blank lines. Columns are
+//! separated by the character that separates the header's names; decimal commas are read unless that is a comma.
 //!
-//! A text is read row by row and may be larger than the memory: what is kept of it are the numbers of the columns asked for.
+//! A text is read row by row and may be larger than the memory: only the numbers of the columns asked for are kept.
 
 use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use csv::{Reader, ReaderBuilder, StringRecord};
 
-use super::room::too_large;
+use super::budget::too_large;
 use super::source::{BLOCK, Source};
 use residyn_core::data::{CellFault, LogError, Place};
 use residyn_core::data::{Numbers, Table};
 use residyn_core::limits::{TEXT_BYTES, unpacked_bytes};
 
-/// A text that is cut into cells.
+/// A text divided into cells.
 pub struct Csv {
     /// As its user calls it.
     path: PathBuf,
@@ -26,7 +26,7 @@ pub struct Csv {
     names: Vec<String>,
 }
 
-/// What may separate columns, the most usual first.
+/// Possible column separators, the most usual first.
 const SEPARATORS: [u8; 4] = *b",;\t|";
 
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
@@ -89,7 +89,7 @@ impl Csv {
 
     /// The number in a cell.
     fn number(&self, cell: &str) -> Result<f64, CellFault> {
-        // What is a number as it stands has no spaces, quotes and commas.
+        // A cell that parses as it stands has no spaces, quotes or commas.
         if let Some(value) = cell.parse().ok().filter(|value: &f64| value.is_finite()) {
             return Ok(value);
         }
@@ -101,8 +101,8 @@ impl Csv {
         }
     }
 
-    /// The line of the first cell at an offset or behind line ends there. Found by counting, as only errors ask for it; the
-    /// reader's own count is behind by one after a CRLF or a blank line.
+    /// The line of the first cell at an offset or after line ends there. Found by counting, since only errors need it;
+    /// the reader's own count is behind by one after a CRLF or a blank line.
     fn line_from(&self, offset: u64) -> Result<Place, LogError> {
         let mut lines = Lines::default();
         for (at, byte) in (0..).zip(BufReader::with_capacity(BLOCK, self.text()?).bytes()) {
@@ -129,7 +129,7 @@ impl Csv {
         }
     }
 
-    /// The line of the first byte that is no UTF-8.
+    /// The line of the first byte that is not UTF-8.
     fn line_of_no_text(&self) -> Result<usize, LogError> {
         let mut text = BufReader::with_capacity(BLOCK, self.text()?);
         let (mut lines, mut unread) = (Lines::default(), Vec::new());
@@ -140,7 +140,7 @@ impl Csv {
             text.consume(read);
             let (valid, is_cut) = match std::str::from_utf8(&unread) {
                 Ok(_) => (unread.len(), read > 0),
-                // A character may go on in the next block.
+                // A character may continue in the next block.
                 Err(error) => (error.valid_up_to(), read > 0 && error.error_len().is_none()),
             };
             lines.pass(&unread[..valid]);
@@ -228,7 +228,7 @@ impl<R: Read> Rows<'_, R> {
     }
 }
 
-/// What separates the columns of a text: what its first line has most of.
+/// The column separator of a text: the one most frequent in its first line.
 fn separator(text: impl Read) -> io::Result<u8> {
     let mut text = BufReader::new(text.take(TEXT_BYTES));
     let mut first = Vec::new();
@@ -236,7 +236,7 @@ fn separator(text: impl Read) -> io::Result<u8> {
         first.clear();
     }
     let count = |separator: u8| first.iter().filter(|byte| **byte == separator).count();
-    // Of equally many, the last is the largest: a comma is where nothing separates.
+    // In a tie the last one wins: a comma if nothing separates.
     let all = SEPARATORS.into_iter().rev();
     let most = all.max_by_key(|separator| count(*separator));
     Ok(most.unwrap_or(b','))
@@ -251,8 +251,8 @@ fn offset(row: &StringRecord) -> u64 {
     row.position().map_or(0, csv::Position::byte)
 }
 
-/// A cell without the spaces around it, and without quotes that stand behind such spaces, where CSV
-/// itself does not take them for quotes.
+/// A cell without the spaces around it, and without quotes after such spaces, which CSV itself does not treat as
+/// quotes.
 fn bare(cell: &str) -> &str {
     cell.trim().trim_matches('"').trim()
 }
@@ -284,7 +284,7 @@ impl Lines {
         }
     }
 
-    /// That of the next byte, from 1.
+    /// The line of the next byte, from 1.
     fn number(&self) -> usize {
         self.ended + 1
     }

@@ -20,7 +20,7 @@ impl Ending {
     /// A file whose description is cut off or damaged.
     pub fn of(file: File) -> Result<Self> {
         let file = Self(file);
-        // A file without a footer is told of by the reader.
+        // The reader reports a file without a footer.
         let Some(footer) = file.len().checked_sub(FOOTER) else {
             return Ok(file);
         };
@@ -46,7 +46,7 @@ impl Length for Ending {
 impl ChunkReader for Ending {
     type T = UpToEnd;
 
-    /// What is read so is the footer, or begins with the description of a page.
+    /// This reads the footer, or data that begin with the description of a page.
     fn get_read(&self, start: u64) -> Result<UpToEnd> {
         if start.checked_add(FOOTER) != Some(self.len()) {
             thrift::pass(&mut self.up_to_end(start)?)?;

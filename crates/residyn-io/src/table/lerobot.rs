@@ -18,7 +18,7 @@ pub(super) struct Episode {
     /// As the caller gave it.
     path: PathBuf,
     set: PathBuf,
-    /// `None` where the path names none: the only one.
+    /// `None` if the path names none: the only episode.
     number: Option<u64>,
 }
 
@@ -28,7 +28,7 @@ const ACTION: (&str, &str) = ("action", "cmd");
 const EPISODE: &str = "episode_index";
 const TIME: &str = "timestamp";
 
-/// What follows a joint's name in a data set whose state is more than positions, and the stem that it stands for.
+/// Suffixes of joint names in a data set whose state is more than positions, and the stems that they stand for.
 const SUFFIXES: [(&str, Option<&str>); 4] = [
     (".pos", None),
     (".vel", Some("qd")),
@@ -64,7 +64,7 @@ impl Episode {
     /// The columns `time`, `q_JOINT` of the state and `cmd_JOINT` of the action.
     ///
     /// # Errors
-    /// A data set that cannot be read, no such episode, and several where none is named.
+    /// A data set that cannot be read, no such episode, and several if none is named.
     pub fn read(&self) -> Result<Arrays, LogError> {
         let files = self.files().map_err(|why| self.unreadable(why))?;
         let (mut frames, info) = (self.frames(&files)?, self.info()?);
@@ -123,7 +123,7 @@ impl Episode {
         }
     }
 
-    /// The files of the data set; of version 2 the one of the episode.
+    /// The files of the data set; in version 2 only the file of the episode.
     fn files(&self) -> io::Result<Vec<PathBuf>> {
         let mut files = Vec::new();
         for chunk in fs::read_dir(self.set.join("data"))? {
@@ -166,7 +166,7 @@ impl Episode {
     }
 }
 
-/// What tells a data set, and describes it.
+/// The file that identifies a data set and describes it.
 const INFO: &str = "meta/info.json";
 
 #[derive(Debug, Deserialize)]
@@ -181,7 +181,7 @@ struct Feature {
 }
 
 impl Info {
-    /// The name of a column: `q_elbow` for `elbow.pos`, or with a number where the joints have no names.
+    /// The name of a column: `q_elbow` for `elbow.pos`, or with a number if the joints have no names.
     fn column(&self, feature: &str, stem: &str, index: usize) -> String {
         let Some(joint) = self.names(feature).get(index).copied() else {
             return format!("{stem}{}", index + 1);

@@ -34,7 +34,7 @@ pub(super) fn read(path: &Path, source: &Source) -> Result<Arrays, LogError> {
     }
 }
 
-/// A text, an offset, a version and the order of bytes.
+/// A text, an offset, a version and the byte order.
 const HEADER: usize = 128;
 
 fn add_all(table: &mut Unpacked, mut bytes: impl BufRead) -> Result<(), String> {
@@ -64,11 +64,11 @@ fn fault(why: io::Error) -> String {
     }
 }
 
-/// What the bytes of an element are: one of [`NUMBERS`], or these.
+/// Types of an element: one of [`NUMBERS`], or these.
 const MATRIX: u32 = 14;
 const PACKED: u32 = 15;
 
-/// Types of numbers, and what NumPy calls them.
+/// Types of numbers, and their names in NumPy.
 const NUMBERS: [(u32, &str); 10] = [
     (1, "|i1"),
     (2, "|u1"),
@@ -85,14 +85,14 @@ const NUMBERS: [(u32, &str); 10] = [
 /// An element, whose bytes are read one after the other.
 struct Element<'a> {
     kind: u32,
-    /// Up to four that stand beside their type and size, or those that follow.
+    /// Up to four bytes next to their type and size, or those that follow.
     bytes: io::Chain<io::Take<Cursor<[u8; 4]>>, io::Take<&'a mut dyn Read>>,
     /// Bytes between it and the next.
     padding: u64,
 }
 
 impl<'a> Element<'a> {
-    /// The next one.
+    /// The next element.
     fn of(bytes: &'a mut dyn Read) -> io::Result<Self> {
         let (word, next) = (u32::from_le_bytes(word(bytes)?), word(bytes)?);
         let (kind, beside, size) = match word >> 16 {
@@ -102,7 +102,7 @@ impl<'a> Element<'a> {
         Ok(Self {
             kind,
             bytes: Cursor::new(next).take(beside).chain(bytes.take(size)),
-            // All but packed elements are filled up to eight bytes.
+            // All but packed elements are padded to eight bytes.
             padding: match kind {
                 PACKED => 0,
                 _ => size.next_multiple_of(8) - size,
@@ -110,13 +110,13 @@ impl<'a> Element<'a> {
         })
     }
 
-    /// Whether it has no bytes, or none any more.
+    /// Whether it has no bytes left.
     fn is_empty(&self) -> bool {
         let (beside, behind) = self.bytes.get_ref();
         beside.limit() == 0 && behind.limit() == 0
     }
 
-    /// All bytes of one that is short, up to the next.
+    /// All bytes of a short element, up to the next.
     fn whole(mut self) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         self.bytes.by_ref().take(SHORT).read_to_end(&mut bytes)?;
@@ -124,14 +124,14 @@ impl<'a> Element<'a> {
         Ok(bytes)
     }
 
-    /// Passes over what is not read yet.
+    /// Skips what is not read yet.
     fn pass(mut self) -> io::Result<()> {
         io::copy(&mut self.bytes, &mut io::sink())?;
         if !self.is_empty() {
             return Err(ErrorKind::UnexpectedEof.into());
         }
         let (_, behind) = self.bytes.into_inner();
-        // The last element is not always filled up.
+        // The last element is not always padded.
         io::copy(&mut behind.into_inner().take(self.padding), &mut io::sink())?;
         Ok(())
     }
@@ -157,7 +157,7 @@ fn add(table: &mut Unpacked, element: &mut Element<'_>) -> Result<(), String> {
     table.add(&name, array)
 }
 
-/// The array of a matrix, and its name; `None` for what is no matrix of numbers. One row or one column is a vector.
+/// The array of a matrix, and its name; `None` if it is not a matrix of numbers. One row or one column is a vector.
 fn array(matrix: &mut dyn Read) -> io::Result<Option<(String, Array<impl Read>)>> {
     let flags = Element::of(matrix)?.whole()?;
     let sizes = Element::of(matrix)?.whole()?;
@@ -169,7 +169,7 @@ fn array(matrix: &mut dyn Read) -> io::Result<Option<(String, Array<impl Read>)>
         [rows, columns] => vec![rows, columns],
         _ => return Ok(None),
     };
-    // The class is of all numbers 6 (double) to 15.
+    // The classes of numbers are 6 (double) to 15.
     if !flags.first().is_some_and(|class| (6..=15).contains(class)) {
         return Ok(None);
     }

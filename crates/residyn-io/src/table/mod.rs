@@ -1,6 +1,7 @@
 //! Files of logs, as named columns of numbers: one reader a format behind one function.
 
 mod arrays;
+mod budget;
 mod csv;
 #[cfg(feature = "parquet")]
 mod ending;
@@ -13,7 +14,7 @@ mod npz;
 mod parquet;
 #[cfg_attr(not(feature = "recordings"), path = "no_recording.rs")]
 mod recording;
-mod room;
+
 mod source;
 #[cfg(feature = "parquet")]
 mod thrift;
@@ -27,13 +28,13 @@ use residyn_core::data::{Columns, LogError, Table};
 use crate::guarded::guarded;
 use residyn_core::limits::LOG_COLUMNS;
 
-/// How files of each format but text begin.
+/// The first bytes of each format except text.
 const ZIP: &[u8] = b"PK\x03\x04";
 const PARQUET: &[u8] = b"PAR1";
 const SQLITE: &[u8] = b"SQLite format 3\0";
 const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
-/// Files that are known and not read: how they begin, and the line that converts them.
+/// Formats that are recognised but not read: their first bytes, and the line that converts them.
 const FOREIGN: [(&[u8], &str); 7] = [
     (
         b"#ROSBAG",
@@ -68,7 +69,7 @@ const FOREIGN: [(&[u8], &str); 7] = [
     ),
 ];
 
-/// The table that a file or a folder holds, whatever its format: by how it begins, not by its name. Of files that hold
+/// The table that a file or a folder holds, whatever its format: by how it begins, not by its name. If a file holds
 /// several tables, the one that has the columns.
 ///
 /// # Errors

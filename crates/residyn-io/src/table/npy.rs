@@ -5,25 +5,25 @@
 
 use std::io::{self, BufReader, ErrorKind, Read};
 
-use super::room::Room;
+use super::budget::Budget;
 use residyn_core::limits::LOG_COLUMNS;
 
 /// An array whose numbers are still to be read.
 pub(super) struct Array<R> {
     /// `<f8`
     pub kind: String,
-    /// Whether a column follows the other, rather than a row.
+    /// Whether it is stored by columns rather than by rows.
     pub by_columns: bool,
     pub shape: Vec<usize>,
     pub numbers: R,
 }
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
-/// The longest header; NumPy itself reads none of more than 10 000 bytes unless it is told to.
+/// The longest header; NumPy itself refuses more than 10 000 bytes by default.
 const HEADER: usize = 1 << 16;
 
 impl<R: Read> Array<R> {
-    /// `None` for what is no array.
+    /// `None` if it is not an array.
     pub fn of(mut bytes: R) -> Option<Self> {
         let [magic @ .., version, _] = take::<8>(&mut bytes)?;
         let length = match version {
@@ -56,27 +56,27 @@ impl<R: Read> Array<R> {
         self.kind.starts_with("<U") || self.kind.starts_with("|S")
     }
 
-    /// Its columns: one of a vector, of a matrix as many as it has, a row a sample; none of what is neither, or of texts. Objects
-    /// are refused unread: to read them is to run the code that they name.
+    /// Its columns: one for a vector, as many as it has for a matrix with one row per sample; none for other arrays or
+    /// for texts. Objects are refused unread, since reading them runs the code that they name.
     ///
     /// # Errors
     /// An array that holds something else, has too many columns or numbers, or is cut off.
     #[allow(clippy::cast_precision_loss)] // integers of loggers are far below 2^53
-    pub fn columns(self, name: &str, room: &mut Room) -> Result<Vec<Vec<f64>>, String> {
+    pub fn columns(self, name: &str, budget: &mut Budget) -> Result<Vec<Vec<f64>>, String> {
         if self.is_text() || !(1..=2).contains(&self.shape.len()) {
             return Ok(Vec::new());
         }
         let columns = match self.kind.as_str() {
-            "<f8" => self.each(room, f64::from_le_bytes),
-            "<f4" => self.each(room, |bytes| f64::from(f32::from_le_bytes(bytes))),
-            "<i8" => self.each(room, |bytes| i64::from_le_bytes(bytes) as f64),
-            "<i4" => self.each(room, |bytes| f64::from(i32::from_le_bytes(bytes))),
-            "<i2" => self.each(room, |bytes| f64::from(i16::from_le_bytes(bytes))),
-            "<u8" => self.each(room, |bytes| u64::from_le_bytes(bytes) as f64),
-            "<u4" => self.each(room, |bytes| f64::from(u32::from_le_bytes(bytes))),
-            "<u2" => self.each(room, |bytes| f64::from(u16::from_le_bytes(bytes))),
-            "|u1" | "|b1" => self.each(room, |[byte]| f64::from(byte)),
-            "|i1" => self.each(room, |byte| f64::from(i8::from_le_bytes(byte))),
+            "<f8" => self.each(budget, f64::from_le_bytes),
+            "<f4" => self.each(budget, |bytes| f64::from(f32::from_le_bytes(bytes))),
+            "<i8" => self.each(budget, |bytes| i64::from_le_bytes(bytes) as f64),
+            "<i4" => self.each(budget, |bytes| f64::from(i32::from_le_bytes(bytes))),
+            "<i2" => self.each(budget, |bytes| f64::from(i16::from_le_bytes(bytes))),
+            "<u8" => self.each(budget, |bytes| u64::from_le_bytes(bytes) as f64),
+            "<u4" => self.each(budget, |bytes| f64::from(u32::from_le_bytes(bytes))),
+            "<u2" => self.each(budget, |bytes| f64::from(u16::from_le_bytes(bytes))),
+            "|u1" | "|b1" => self.each(budget, |[byte]| f64::from(byte)),
+            "|i1" => self.each(budget, |byte| f64::from(i8::from_le_bytes(byte))),
             "|O" => Err(
                 "holds pickled objects, which are never read, since they can run any code; save arrays of numbers"
                     .to_owned(),
@@ -90,12 +90,12 @@ impl<R: Read> Array<R> {
 
     fn each<const SIZE: usize>(
         self,
-        room: &mut Room,
+        budget: &mut Budget,
         number: impl Fn([u8; SIZE]) -> f64,
     ) -> Result<Vec<Vec<f64>>, String> {
         let length = |axis: usize| self.shape.get(axis).copied().unwrap_or(1);
         let columns = length(1);
-        // Rows without a cell are none.
+        // Rows without cells do not count.
         let rows = if columns == 0 { 0 } else { length(0) };
         if columns > LOG_COLUMNS {
             return Err(format!(
@@ -103,7 +103,8 @@ impl<R: Read> Array<R> {
             ));
         }
         let count = (rows as u64).saturating_mul(columns as u64);
-        room.take_numbers(count)
+        budget
+            .take_numbers(count)
             .map_err(|why| format!("is too large: {why}"))?;
         let mut all: Vec<Vec<f64>> = (0..columns).map(|_| Vec::with_capacity(rows)).collect();
         let mut numbers = BufReader::new(self.numbers);
@@ -127,7 +128,7 @@ impl<R: Read> Array<R> {
             }
             _ => unreadable(why),
         })?;
-        // Checksums are told where the numbers end.
+        // Checksum errors are reported where the numbers end.
         match numbers.bytes().next().transpose() {
             Ok(None) => Ok(all),
             Ok(Some(_)) => Err(format!(
@@ -138,14 +139,14 @@ impl<R: Read> Array<R> {
     }
 }
 
-/// The next bytes; `None` where there are not as many.
+/// The next bytes; `None` if there are too few.
 fn take<const SIZE: usize>(bytes: &mut impl Read) -> Option<[u8; SIZE]> {
     let mut taken = [0; SIZE];
     bytes.read_exact(&mut taken).ok()?;
     Some(taken)
 }
 
-/// What stands in quotes, or all of a description of fields, which has none around it.
+/// The text in quotes, or all of a description of fields, which is not quoted.
 fn kind(described: &str) -> &str {
     let quoted = described.strip_prefix('\'');
     let quoted = quoted.and_then(|rest| rest.split_once('\''));

@@ -12,7 +12,7 @@ use super::npy::Array;
 use crate::files;
 
 /// # Errors
-/// An archive that cannot be read, and arrays of what is neither number nor text.
+/// An archive that cannot be read, and arrays of neither numbers nor texts.
 pub(super) fn read(path: &Path) -> Result<Arrays, LogError> {
     let unreadable = |why| LogError::Open {
         path: path.to_owned(),

@@ -9,8 +9,8 @@ use parquet::record::Field;
 use parquet::record::reader::RowIter;
 use parquet::schema::types::Type;
 
+use super::budget::too_large;
 use super::ending::Ending;
-use super::room::too_large;
 use crate::files;
 use residyn_core::data::Arrays;
 use residyn_core::data::LogError;
@@ -36,19 +36,19 @@ pub(super) fn read(path: &Path) -> Result<Arrays, LogError> {
     Ok(table)
 }
 
-/// A column, of which each row has a list of numbers, or one of them.
+/// A column in which each row has a list of numbers, or a single number.
 pub(super) struct List {
     pub name: String,
     pub is_list: bool,
     rows: usize,
     /// One for each number of the first row.
     columns: Vec<Vec<f64>>,
-    /// The first row that has not as many, and how many it has. Nothing is kept from there on.
+    /// The first row with a different count, and that count. Nothing is kept from there on.
     ragged: Option<(usize, usize)>,
 }
 
 impl List {
-    /// One without a row, whose first will be this.
+    /// A column without rows yet, whose first will be `first`.
     ///
     /// # Errors
     /// More numbers than a log has columns.
@@ -56,11 +56,11 @@ impl List {
         let mut row = Vec::new();
         add_numbers(first, &mut row);
         if row.len() > LOG_COLUMNS {
-            let told = format!(
+            let message = format!(
                 "{name:?} has {} numbers a row, and at most {LOG_COLUMNS} columns are read",
                 row.len()
             );
-            return Err(ParquetError::General(told));
+            return Err(ParquetError::General(message));
         }
         Ok(Self {
             name: name.to_owned(),
@@ -108,7 +108,7 @@ impl List {
         self.rows += other.rows;
     }
 
-    /// Those rows of which this says so, in their order.
+    /// Keeps the rows for which `is_kept` is true, in their order.
     pub fn retain(&mut self, is_kept: impl Fn(usize) -> bool) {
         for column in &mut self.columns {
             let mut row = 0..;
@@ -116,7 +116,7 @@ impl List {
         }
     }
 
-    /// Adds a row, with a place for its numbers.
+    /// Adds a row; `numbers` is a buffer for its numbers.
     fn push(&mut self, field: &Field, numbers: &mut Vec<f64>) {
         numbers.clear();
         add_numbers(field, numbers);
@@ -171,8 +171,8 @@ fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>
     Ok(lists)
 }
 
-/// Whether the cells of all columns take no more than so many bytes: those of the pages, since a packed one may hold any number
-/// of them, whatever the description of the file says.
+/// Check that the cells of all columns take at most `most` bytes, counted in the pages, since a packed page may hold
+/// any number of cells, whatever the description of the file says.
 fn check_size(reader: &SerializedFileReader<Ending>, most: u64) -> Result<(), ParquetError> {
     let described = reader.metadata().file_metadata();
     let columns = described.schema().get_fields().len() as u64;
@@ -201,7 +201,7 @@ fn check_cells(cells: u64, most: u64) -> Result<(), ParquetError> {
     }
 }
 
-/// The numbers of a cell; none where it holds something else.
+/// The numbers of a cell; none if it holds something else.
 fn add_numbers(field: &Field, numbers: &mut Vec<f64>) {
     match field {
         Field::ListInternal(list) => {

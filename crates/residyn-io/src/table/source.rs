@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 
 use flate2::bufread::MultiGzDecoder;
 
-use super::room::Unpacked;
+use super::budget::Unpacked;
 use crate::files;
 use residyn_core::data::LogError;
 
-/// How files begin that are packed with gzip.
+/// The first bytes of gzip files.
 const GZIP: &[u8] = b"\x1f\x8b";
 
-/// Bytes that are taken from a file at once.
+/// Bytes that are read from a file at once.
 pub(super) const BLOCK: usize = 1 << 16;
 
-/// A file, unpacked where it is packed with gzip.
+/// A file, unpacked if it is packed with gzip.
 pub struct Source {
     path: PathBuf,
     size: u64,
@@ -48,12 +48,12 @@ impl Source {
         self.is_packed
     }
 
-    /// Its bytes as it is, packed or not.
+    /// Its size as stored, packed or not \[bytes\].
     pub fn size(&self) -> u64 {
         self.size
     }
 
-    /// All that it holds, from the beginning.
+    /// Its contents, from the beginning.
     ///
     /// # Errors
     /// A file that cannot be opened.

@@ -3,15 +3,15 @@
 
 use std::io::{self, Error, Read};
 
-/// Structures and lists within each other.
+/// Nested structures and lists.
 const DEPTH: u8 = 64;
 /// Booleans of a list; Parquet itself has no such list where this looks.
 const BOOLEANS: u64 = 1000;
 
-/// Passes over a structure.
+/// Skips a structure.
 ///
 /// # Errors
-/// One that is cut off, too deep, or of too many booleans, and bytes that are no structure.
+/// A structure that is cut off, too deep, or has too many booleans, and bytes that are not a structure.
 pub(super) fn pass(bytes: &mut impl Read) -> io::Result<()> {
     value(bytes, 12, DEPTH)
 }
@@ -19,7 +19,7 @@ pub(super) fn pass(bytes: &mut impl Read) -> io::Result<()> {
 fn value(bytes: &mut impl Read, kind: u8, depth: u8) -> io::Result<()> {
     let depth = depth.checked_sub(1).ok_or_else(|| damaged("too deep"))?;
     match kind {
-        // A boolean is in its kind.
+        // A boolean's value is in its kind.
         1 | 2 => Ok(()),
         3 => skip(bytes, 1),
         4..=6 => whole(bytes).map(drop),
@@ -56,7 +56,7 @@ fn structure(bytes: &mut impl Read, depth: u8) -> io::Result<()> {
         if head == 0 {
             return Ok(());
         }
-        // The number of the field, where it is far from the one before.
+        // The number of the field, if it is far from the one before.
         if head >> 4 == 0 {
             whole(bytes)?;
         }
@@ -83,7 +83,7 @@ fn byte(bytes: &mut impl Read) -> io::Result<u8> {
     Ok(byte[0])
 }
 
-/// A whole number, seven bits a byte, the lowest first.
+/// A whole number, seven bits per byte, the lowest first.
 fn whole(bytes: &mut impl Read) -> io::Result<u64> {
     let mut number = 0;
     for place in 0..10 {

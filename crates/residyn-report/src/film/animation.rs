@@ -10,12 +10,12 @@ use crate::plot::legend::with_key;
 use crate::plot::scale::Range;
 use crate::plot::style::{MARGIN, Stroke, WIDTH};
 
-/// More than this, an eye does not tell from motion between the frames.
+/// The eye gains nothing from more frames than this.
 const FRAMES_PER_S: f64 = 25.0;
 const STAGE_HEIGHT: f64 = 400.0;
 const LINK_PX: f64 = 10.0;
 const JOINT_PX: f64 = 5.0;
-/// As much of the tip's path as shows where it comes from, without the tangle of all that came before.
+/// Enough of the tip's path to show where it comes from, without the tangle of all earlier motion.
 const TAIL_PX: f64 = 400.0;
 
 /// An episode of a mechanism in a plane.
@@ -24,7 +24,7 @@ pub struct Animation {
     pub title: String,
     /// Time from one frame to the next in s.
     pub step_s: f64,
-    /// The bodies, all with as many frames; at least one. The last point of the last one leaves a trace.
+    /// The bodies, at least one, all with the same number of frames. The last point of the last body leaves a trace.
     pub chains: Vec<Chain>,
     /// What is shown over time below the motion, from the top.
     pub strips: Vec<Strip>,
@@ -44,8 +44,8 @@ struct Motion {
     chains: Vec<Vec<Vec<(f64, f64)>>>,
 }
 
-/// Draws a film: one SVG document that plays an episode in real time, for ever, wherever SVG animations are played,
-/// and elsewhere shows its last frame.
+/// Draws a film: one SVG document that plays an episode in real time and in an endless loop wherever SVG animations are
+/// played, and shows its last frame elsewhere.
 ///
 /// It has 25 frames a second at most, with straight motion between them. It ends before the first frame that has a
 /// point that is not finite; a remark says so.
@@ -125,7 +125,7 @@ fn finite_frames(episode: &Animation) -> usize {
     finite.min().unwrap_or(0)
 }
 
-/// When the motion ends, where that is before the episode does.
+/// When the motion ends, if that is before the end of the episode.
 fn cut_s(episode: &Animation) -> Option<f64> {
     let finite = finite_frames(episode);
     let is_cut = episode
@@ -162,7 +162,7 @@ impl Stage {
     fn new(motion: &Motion, strips: &[Axis], top: f64) -> Self {
         let (x, y) = (span(motion, |point| point.0), span(motion, |point| point.1));
         let y_axis = |range| Axis::vertical(range, STAGE_HEIGHT, "y", "m");
-        // The numbers hardly change their width when the range is opened to the shape of the area.
+        // The numbers hardly change their width when the range is widened to the shape of the area.
         let gutters = strips.iter().map(Axis::gutter);
         let left = MARGIN + gutters.fold(y_axis(y).gutter(), f64::max);
         let width = WIDTH - left - MARGIN;
@@ -283,7 +283,7 @@ fn body(frames: &[Vec<(f64, f64)>], duration_s: f64, colour: &'static str) -> [P
     ]
 }
 
-/// The values of an attribute at evenly spaced times, gone through again and again.
+/// The values of an attribute at evenly spaced times, repeated without end.
 fn animated(attribute: &str, values: &[String], duration_s: f64) -> Animate {
     Animate::new()
         .set("attributeName", attribute)

@@ -19,7 +19,7 @@ pub struct Film<'e> {
     pub figure: Vec<Vec<Vec<[f64; 2]>>>,
     /// Torques in N m, `[joint][frame]`.
     pub torques: &'e [Vec<f64>],
-    /// The reward of each step, the last one for two frames.
+    /// The reward of each step; the last one is shown for two frames.
     pub rewards: &'e [f64],
 }
 

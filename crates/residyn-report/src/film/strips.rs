@@ -28,7 +28,7 @@ pub struct Strip {
 pub struct StripLine {
     /// Its name in the key.
     pub label: String,
-    /// One a step of the animation, the first at time 0.
+    /// One per step of the animation, the first at time 0.
     pub values: Vec<f64>,
 }
 
@@ -51,7 +51,7 @@ pub(super) fn strip_axis(strip: &Strip) -> Axis {
     Axis::vertical(range, STRIP_HEIGHT, name, unit)
 }
 
-/// Draws the strips from an area on over a common time axis, and says where they end.
+/// Draws the strips from an area down over a common time axis, and returns where they end.
 pub(super) fn draw_strips(
     canvas: &mut Canvas,
     strips: &[Strip],
@@ -123,7 +123,7 @@ fn cursor(last: &Frame, top: f64, duration_s: f64) -> Group {
         .add(run)
 }
 
-/// A duration as SVG animations take it.
+/// A duration as SVG animations expect it.
 pub(super) fn clock_value(duration_s: f64) -> String {
     format!("{duration_s:.3}s")
 }

@@ -15,7 +15,7 @@ const MARK: f64 = 0.15;
 /// Height of a mark on a rail, as a share of the rail.
 const HEIGHT: f64 = 0.3;
 
-/// How the joints are drawn, and each of them.
+/// How the joints are drawn, and a picture of each.
 pub(super) fn drawn(outcome: &Outcome, tracks: &Tracks) -> (&'static str, Vec<PictureEntry>) {
     let picture = |joint: Joint| {
         let about = format!("joint {}", label(outcome, joint));
@@ -24,7 +24,7 @@ pub(super) fn drawn(outcome: &Outcome, tracks: &Tracks) -> (&'static str, Vec<Pi
             false => dial(about, joint).moved(tracks),
         }
     };
-    let words = "The equations do not tell how the joints are joined, so each is drawn by itself: an angle turns a hand \
+    let words = "The equations do not say how the joints are connected, so each is drawn by itself: an angle turns a hand \
                  anticlockwise from the mark, a sliding joint moves along a rail.";
     let joints = Joint::all(outcome.given.prismatic.len());
     (words, joints.map(picture).collect())

@@ -10,12 +10,12 @@ use residyn_core::model::chain::{Joint, Pose, recover};
 
 /// Half the length of the line that stands for the base, as a share of the mechanism.
 const BASE: f64 = 0.12;
-/// A mechanism that is seen from above has its line of sight this near to the vertical (cosine).
+/// A mechanism is seen from above if its line of sight is this near to the vertical (cosine).
 const STEEP: f64 = 0.95;
-/// Links that reach less far (m) are drawn as joints.
+/// Links that reach less far than this (m) are drawn as joints.
 const SHORTEST: f64 = 1e-3;
 
-/// How the mechanism is drawn, and its picture; none where its links are not known.
+/// How the mechanism is drawn, and its picture; none if its links are not known.
 pub(super) fn drawn(
     outcome: &Outcome,
     tracks: &Tracks,
@@ -47,15 +47,15 @@ fn links(outcome: &Outcome) -> Option<(&'static str, Vec<Joint>)> {
         let words = "The links are drawn as the model file describes them, to the centre of mass of the last body.";
         return Some((words, described.joints));
     }
-    // Of what slides alone there is nothing to see.
+    // A mechanism that only slides has nothing to show.
     let turns = fitted.prismatic.contains(&false);
     let bare = fitted.absorbed().without_drive().with_effects(Vec::new());
     let found = turns.then(|| recover(&bare.dynamics(), &bare.prismatic).ok())?;
-    let words = "The links are those of a mechanism with the fitted equations; lengths that these do not tell are chosen.";
+    let words = "The links are those of a mechanism with the fitted equations; lengths that they do not determine are assumed.";
     Some((words, found?.joints))
 }
 
-/// The base, where the first joint turns on it, the joints and the centre of mass of the last body, m.
+/// The base if the first joint turns on it, the joints, and the centre of mass of the last body, m.
 fn points(links: &[Joint], q: &[f64]) -> Vec<Vector3<f64>> {
     let mut own = q.iter();
     let mut coordinates: Vec<f64> = Vec::with_capacity(links.len());
@@ -81,7 +81,7 @@ fn points(links: &[Joint], q: &[f64]) -> Vec<Vector3<f64>> {
     points
 }
 
-/// The directions to the right and upwards where points are seen from the side to which they spread least.
+/// The directions to the right and upwards when points are viewed along the direction in which they spread least.
 fn view(seen: &[Vec<Vector3<f64>>]) -> [Vector3<f64>; 2] {
     let all = || seen.iter().flatten();
     #[allow(clippy::cast_precision_loss)] // thousands

@@ -8,27 +8,27 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::sketch::PictureEntry;
-use super::shown::{motion, variance};
+use super::plot_data::{motion, variance};
 use residyn_core::closeloop::Outcome;
 
-/// the rig in motion: the beginning of the first test log, as measured and as predicted from states of the log
+/// the rig in motion: the beginning of the first test log, as measured and as predicted from logged states
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct MotionEntry {
     pub log: String,
     /// how long each prediction runs before the next one starts, s
     pub horizon_s: f64,
-    /// of each frame, s
+    /// time of each frame, s
     pub time: Vec<f64>,
     /// the frame in which the declared model, fitted, is farthest off, counted from 0
     pub still: usize,
     /// how the rig is drawn, in a sentence
     pub drawn: String,
-    /// one of the mechanism, or one a joint where the equations are of no mechanism that is known
+    /// one of the mechanism, or one per joint if the equations do not belong to a known mechanism
     #[schemars(length(min = 1))]
     pub pictures: Vec<PictureEntry>,
 }
 
-/// Length of the part that is shown, s, and its frames a second.
+/// Length of the part that is shown, s, and its frames per second.
 const LENGTH_S: f64 = 6.0;
 const FRAMES_PER_S: f64 = 25.0;
 
@@ -39,7 +39,7 @@ type Frames = Vec<Vec<f64>>;
 type Tracks = [Frames; 3];
 
 impl MotionEntry {
-    /// None where no stretch of the first test log is as long as the middle horizon.
+    /// None if no segment of the first test log is as long as the middle horizon.
     pub fn of(outcome: &Outcome) -> Option<Self> {
         let predicted = outcome.predictions.middle.as_ref()?;
         let models = [predicted.before.as_slice(), &predicted.after];
@@ -66,7 +66,7 @@ impl MotionEntry {
     }
 }
 
-/// The rows that are shown: evenly spaced, as far as there are any.
+/// The rows that are shown, spaced as evenly as the log allows.
 fn frames(time: &[f64]) -> Vec<usize> {
     let start_s = time.first().copied().unwrap_or(0.0);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few hundred frames
@@ -76,7 +76,8 @@ fn frames(time: &[f64]) -> Vec<usize> {
     (0..end).filter(is_first).collect()
 }
 
-/// The frame in which the prediction before is farthest from what was measured, in units of how much each joint varies.
+/// The frame in which the prediction without effects is farthest from the measurement, in units of each joint's
+/// variation.
 fn still([measured, before, _]: &Tracks) -> Option<usize> {
     let joints = measured.first()?.len();
     let vary: Vec<f64> = (0..joints)

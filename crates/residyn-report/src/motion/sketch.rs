@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Tracks;
 
-/// lines in units of its own, as SVG gives points
+/// lines in the picture's own units, as SVG gives points
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct PictureEntry {
     /// what it shows
@@ -16,9 +16,9 @@ pub(crate) struct PictureEntry {
     pub ground: String,
     /// the line that moves, for each frame
     pub measured: Vec<String>,
-    /// of the declared model, fitted; empty where a prediction is far from any number
+    /// prediction of the declared model, fitted; empty where it is far outside the picture or not finite
     pub before: Vec<String>,
-    /// of the model with the effects
+    /// prediction of the model with the effects
     pub after: Vec<String>,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct Sketch<F> {
 const SIDE: f64 = 1000.0;
 /// Room around, as a share of the longer side.
 const ROOM: f64 = 0.08;
-/// Points farther away than so many sides are not drawn.
+/// Points farther away than this multiple of the longer side are not drawn.
 const FAR: f64 = 10.0;
 
 impl<F: Fn(&[f64]) -> Vec<Point>> Sketch<F> {
@@ -73,7 +73,7 @@ impl<F: Fn(&[f64]) -> Vec<Point>> Sketch<F> {
         format!("{} {} {} {}", corner[0], corner[1], size[0], size[1])
     }
 
-    /// Whole numbers, a point once where several in a row are the same.
+    /// Whole numbers; a point that is repeated in a row appears once.
     fn text(&self, line: &[Point]) -> String {
         let seen = line.iter().map(|[x, y]| [self.units(*x), -self.units(*y)]);
         let seen: Vec<Point> = seen.collect();

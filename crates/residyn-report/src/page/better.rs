@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::Section;
 use crate::accuracy::{
     compared, compared_on_logs, diverged, fitted_tests, position_unit, removed, removed_of_motion,
-    repeated, scored, scored_torques, uneven, zeroed_in_vain,
+    repeated, scored, scored_torques, uneven, zeroing_that_harms,
 };
 use crate::schema::{Report, TorqueEntry};
 use crate::wording::{FITTED, WITH_EFFECTS, WITH_FRICTION, capitalised, small};
@@ -19,8 +19,8 @@ pub(super) fn section(report: &Report) -> Section {
         .map(|torque| of_torques(report, torque));
     let motion = of_motion(report);
     let ordered = match report.compared {
-        residyn_core::closeloop::Space::Motion => [Some(motion), torque],
-        residyn_core::closeloop::Space::Torque => [torque, Some(motion)],
+        residyn_core::closeloop::ErrorModel::OutputError => [Some(motion), torque],
+        residyn_core::closeloop::ErrorModel::InverseDynamics => [torque, Some(motion)],
     };
     let tested = fitted_tests(report).map_or_else(
         || ", to which nothing was fitted.".to_owned(),
@@ -34,7 +34,7 @@ pub(super) fn section(report: &Report) -> Section {
                 "fitted and no effect added: the fair \u{201c}before\u{201d} of every comparison. " (compared(report)) }
             @if report.error.with_friction.is_some() {
                 p { "\u{201c}" (capitalised(WITH_FRICTION)) "\u{201d} has Coulomb and viscous friction on every joint as well: what "
-                    "most would try first." }
+                    "most engineers would try first." }
             }
             @for table in ordered.iter().flatten() { (table) }
             @if !report.error.by_log.is_empty() { (of_test_logs(report)) }
@@ -102,7 +102,7 @@ fn of_motion(report: &Report) -> Markup {
                 }
             }
         } }
-        @for said in [removed_of_motion(error), uneven(report), zeroed_in_vain(error)].iter().flatten() { p { (said) } }
+        @for said in [removed_of_motion(error), uneven(report), zeroing_that_harms(error)].iter().flatten() { p { (said) } }
         @for (name, model) in &models {
             @if let Some(diverged) = diverged(name, model) { p { (diverged) } }
         }

@@ -5,15 +5,15 @@ use maud::{Markup, html};
 use crate::by_log::OfLogEntry;
 use crate::schema::{ParameterEntry, Report};
 use crate::wording::{amount, small};
-use residyn_core::closeloop::Space;
+use residyn_core::closeloop::ErrorModel;
 use residyn_core::digits::{amount_of, digits_of};
 
 pub(super) fn by_log(report: &Report) -> Markup {
     html! {
         @if !report.by_log.is_empty() {
             h3 { "Do the logs agree?" }
-            p { "The model with effects, fitted to each training log alone. A value is marked where its distance from that of all logs "
-                "together is more than its own 95 % interval explains, and not told where that is far wider than the value." }
+            p { "The model with effects, fitted to each training log alone. A value is marked if its distance from that of all logs "
+                "together is more than its own 95 % interval explains, and is not determined if that interval is far wider than the value." }
             (values(report))
             (crossed(report))
             (ranges(report))
@@ -61,31 +61,31 @@ fn value(log: &OfLogEntry, name: &str, of_all: f64) -> Markup {
         .find(|parameter| parameter.name == name);
     html! {
         @match own {
-            Some(own) if is_told(own) => td class=(mark(own, of_all)) title=(amount(own)) { (digits_of(own.value, own.ci95).0) },
-            Some(own) => td title=(amount(own)) { "not told" },
+            Some(own) if is_known(own) => td class=(mark(own, of_all)) title=(amount(own)) { (digits_of(own.value, own.ci95).0) },
+            Some(own) => td title=(amount(own)) { "not determined" },
             None => td { "-" },
         }
     }
 }
 
-/// Whether the digits that the interval leaves of a value say anything.
-fn is_told(own: &ParameterEntry) -> bool {
+/// Whether the digits that its interval leaves of a value mean anything.
+fn is_known(own: &ParameterEntry) -> bool {
     digits_of(own.value, own.ci95)
         .0
         .parse()
         .is_ok_and(|shown: f64| shown != 0.0 || own.value == 0.0)
 }
 
-/// What is fitted to the log of a row, on the log of a column.
+/// The model fitted to the row's log, scored on the column's log.
 fn crossed(report: &Report) -> Markup {
     let what = match report.compared {
-        Space::Motion => "open-loop position error at the middle horizon, rad (or m)",
-        Space::Torque => "relative torque error",
+        ErrorModel::OutputError => "open-loop position error at the middle horizon, rad (or m)",
+        ErrorModel::InverseDynamics => "relative torque error",
     };
     let error = |error: &Option<f64>| error.map_or_else(|| "-".to_owned(), small);
     html! {
         @if report.by_log.iter().any(|log| !log.errors.is_empty()) {
-            p { "Fitted to the log of the row, judged on that of the column: " (what) "." }
+            p { "Fitted to the log of the row, scored on the log of the column: " (what) "." }
             div.table tabindex="0" { table {
                 thead { tr { th { "fitted to" } @for log in &report.by_log { th { (log.log) } } } }
                 tbody {

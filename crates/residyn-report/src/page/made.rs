@@ -26,7 +26,7 @@ pub(super) fn section(report: &Report) -> Section {
     })
 }
 
-/// The same of an experiment or of the bench.
+/// As above, for an experiment or the bench.
 pub(super) fn of_results(results: &ResultsPage<'_>) -> Section {
     of(html! {
         (program(env!("CARGO_PKG_VERSION"), results.seed))
@@ -60,7 +60,7 @@ fn folded(what: &str, value: &impl Serialize) -> Markup {
 /// The command, when it ran, and its files with their hashes.
 fn called(call: &Call) -> Markup {
     html! {
-        p { "Begun on " (call.began) ", took " (format!("{:.1}", call.took_s)) " s:" }
+        p { "Started on " (call.began) ", took " (format!("{:.1}", call.took_s)) " s:" }
         pre tabindex="0" { (call.command) }
         @if !call.inputs.is_empty() {
             div.table tabindex="0" { table {

@@ -3,7 +3,7 @@
 use maud::{Markup, PreEscaped, html};
 use pulldown_latex::{Parser, RenderConfig, Storage, config::DisplayMode, push_mathml};
 
-/// A formula in LaTeX as MathML, or as it is where it cannot be read.
+/// A LaTeX formula as MathML, or unchanged if it cannot be read.
 pub(super) fn formula(latex: &str) -> Markup {
     // A row of an `align` environment on its own.
     let latex = latex.replace("&=", "=");

@@ -7,7 +7,7 @@ use super::maths::formula;
 use crate::schema::{EffectEntry, ParameterEntry, Report};
 use crate::text::removed;
 use crate::wording::{amount, p_value};
-use residyn_core::closeloop::Space;
+use residyn_core::closeloop::ErrorModel;
 
 pub(super) fn section(report: &Report) -> Section {
     Section {
@@ -24,8 +24,8 @@ pub(super) fn section(report: &Report) -> Section {
 
 fn card(report: &Report, effect: &EffectEntry) -> Markup {
     let error = match report.compared {
-        Space::Motion => "position error",
-        Space::Torque => "torque error",
+        ErrorModel::OutputError => "position error",
+        ErrorModel::InverseDynamics => "torque error",
     };
     html! {
         article.card {
@@ -60,7 +60,7 @@ fn supported(report: &Report) -> Markup {
         @if !report.supported.is_empty() {
             details {
                 summary { "Supported, not established: " (report.supported.len()) }
-                p { "These lower the loss on stretches left out of the fit and are in the model, but their names are not to be relied on." }
+                p { "These lower the loss on blocks left out of the fit and are in the model, but do not rely on their names." }
                 ul {
                     @for effect in &report.supported {
                         li {

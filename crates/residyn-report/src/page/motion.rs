@@ -11,7 +11,7 @@ pub(super) fn motion(shown: &MotionEntry) -> Markup {
         h3 { "The rig in motion" }
         p.small {
             "The beginning of " (shown.log) ". Each prediction starts from the log, runs for " (shown.horizon_s)
-            " s under what was commanded, and starts anew. " (shown.drawn) " It stands at the moment when the declared model is farthest off."
+            " s under the logged commands, and restarts. " (shown.drawn) " It is paused at the moment when the declared model is farthest off."
         }
         figure.motion {
             div.plots {
@@ -36,7 +36,7 @@ pub(super) fn motion(shown: &MotionEntry) -> Markup {
     }
 }
 
-/// As the script writes it, too.
+/// In the format that the script uses as well.
 fn clock(time_s: f64) -> String {
     format!("at {time_s:.2} s")
 }

@@ -12,9 +12,9 @@ pub(super) fn section(report: &Report) -> Section {
         question: "What next?",
         answer: html! {
             ol {
-                @if has_serious { li { "Mend the logs: what is serious about them stands at the top of this page." } }
+                @if has_serious { li { "Fix the logs: their serious faults stand at the top of this page." } }
                 @for rival in &report.alternatives {
-                    li { "To tell the finding from " strong { (rival.title) } " on joint " (rival.place) ": " (rival.experiment) "." }
+                    li { "To distinguish the finding from " strong { (rival.title) } " on joint " (rival.place) ": " (rival.experiment) "." }
                 }
                 li { "Use the model: " code { (report.files.model) } " holds the declared equations with fitted values and the effects. "
                     code { "residyn export" } " writes it as C, ONNX, FMU, MJCF and more." }

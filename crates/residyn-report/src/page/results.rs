@@ -25,7 +25,7 @@ pub struct ResultsPage<'a> {
     pub shares: Vec<Share>,
     /// A complete SVG document.
     pub figure: Option<&'a str>,
-    /// None where every part has one of its own.
+    /// None if every part has its own.
     pub seed: Option<u64>,
     /// As resolved.
     pub configuration: &'a Value,
@@ -84,7 +84,7 @@ fn shown(results: &ResultsPage<'_>) -> Markup {
     }
 }
 
-/// Wide tables scroll by themselves, and what looks like HTML is text.
+/// Wide tables scroll by themselves, and anything that looks like HTML is text.
 fn markdown(text: &str) -> Markup {
     let events = Parser::new_ext(text, Options::ENABLE_TABLES).flat_map(|event| match event {
         Event::Start(Tag::Table(_)) => vec![

@@ -4,12 +4,12 @@
   const report = JSON.parse(document.getElementById("report").textContent);
   const names = { measured: "measured", before: "declared model, fitted", after: "with effects", hybrid: "with effects and network" };
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
-  // Room for the longest number beside an axis.
+  // Room for the longest number next to an axis.
   const room = (plot, values) => 22 + 7.5 * Math.max(2, ...(values ?? []).map((value) => value.length));
   const axis = () => ({ stroke: colour("faint"), grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line") }, size: room });
   const options = (place, series, extra) => ({
     width: Math.max(place.clientWidth, 200),
-    height: place.dataset.cloud === undefined ? 220 : 170,
+    height: place.dataset.scatter === undefined ? 220 : 170,
     series: [{}, ...series],
     axes: [{ ...axis(), size: 32 }, axis()],
     cursor: { drag: { x: true, y: false } },
@@ -17,10 +17,10 @@
     ...extra,
   });
 
-  // Measured beside predicted.
+  // Measured and predicted.
   const curves = (place) => {
-    const stretch = report.shown.stretches[place.dataset.stretch];
-    const tracks = stretch.joints[place.dataset.joint];
+    const segment = report.plots.segments[place.dataset.segment];
+    const tracks = segment.joints[place.dataset.joint];
     const kinds = ["measured", "before", "after", "hybrid"].filter((kind) => tracks[kind].length > 0);
     const look = {
       measured: { width: 4 },
@@ -29,7 +29,7 @@
       hybrid: { width: 2, dash: [2, 5] },
     };
     const series = kinds.map((kind) => ({ label: names[kind], stroke: colour(kind), points: { show: false }, ...look[kind] }));
-    return new uPlot(options(place, series, { scales: { x: { time: false } } }), [stretch.time, ...kinds.map((kind) => tracks[kind])], place);
+    return new uPlot(options(place, series, { scales: { x: { time: false } } }), [segment.time, ...kinds.map((kind) => tracks[kind])], place);
   };
 
   // Layers with abscissae of their own as the columns of one table, sorted.
@@ -61,10 +61,11 @@
     return added.length > effects.flatMap((curve) => curve.effects).length;
   };
 
-  // What is left over a variable: points; what the effects add, by the formulas of those that depend on this variable alone, with the
-  // band of their intervals, else, if others act on the joint, as the difference of the two, averaged; and the band in which the mean of what they leave lies.
-  const cloud = (place) => {
-    const data = report.shown.residuals[place.dataset.cloud];
+  // The residual over a variable as points; what the effects add, by the formulas of those that depend on this variable
+  // alone with the band of their intervals or, if other effects act on the joint, as the averaged difference of the
+  // two; and the band of the mean residual.
+  const scatter = (place) => {
+    const data = report.plots.residuals[place.dataset.scatter];
     const over = place.dataset.over;
     const x = data[over];
     const variable = over === "time" ? "t" : over;
@@ -129,7 +130,7 @@
       show(still);
     });
   };
-  if (player) play(report.shown.motion);
+  if (player) play(report.plots.motion);
 
   // Zoom by keys: uPlot knows the mouse.
   const keys = (place, plot, event) => {
@@ -152,7 +153,7 @@
   const draw = (place) => {
     if (place.clientWidth === 0) return;
     drawn.get(place)?.destroy();
-    drawn.set(place, place.dataset.stretch === undefined ? cloud(place) : curves(place));
+    drawn.set(place, place.dataset.segment === undefined ? scatter(place) : curves(place));
   };
   const places = [...document.querySelectorAll(".plot")];
   const redraw = () => places.forEach(draw);

@@ -4,11 +4,11 @@ use maud::{Markup, html};
 
 use super::Section;
 use super::motion::motion;
+use crate::plot_data::{ScatterEntry, SegmentEntry};
 use crate::schema::Report;
-use crate::shown::{CloudEntry, StretchEntry};
 
 pub(super) fn section(report: &Report) -> Section {
-    let shown = &report.shown;
+    let shown = &report.plots;
     Section {
         id: "show",
         question: "Show me",
@@ -16,27 +16,27 @@ pub(super) fn section(report: &Report) -> Section {
             p.small.screen { "Drag over a curve to zoom in, double-click to see all of it; on the keyboard + and \u{2212} zoom, "
                 "arrows move, 0 shows all." }
             @if let Some(shown) = &shown.motion { (motion(shown)) }
-            @for (k, stretch) in shown.stretches.iter().enumerate() { (curves(k, stretch)) }
+            @for (k, segment) in shown.segments.iter().enumerate() { (curves(k, segment)) }
             @if !shown.residuals.is_empty() {
                 h3 { "Residual force: what each model leaves unexplained" }
-                p.small { "A point is the force that a short stretch of motion needs beside that of the model. The line is what the effects add by "
-                    "their formulas, with the band of their intervals; where effects depend on more, it is the mean of what all of "
+                p.small { "A point is the force that a short segment of motion needs in addition to the model's. The line is what the effects add by "
+                    "their formulas, with the band of their intervals; if effects depend on more than that, it is the mean of what all of "
                     "them explain." }
-                @for (k, cloud) in shown.residuals.iter().enumerate() { (clouds(report, k, cloud)) }
+                @for (k, scatter) in shown.residuals.iter().enumerate() { (scatters(report, k, scatter)) }
             }
         },
     }
 }
 
-fn curves(k: usize, stretch: &StretchEntry) -> Markup {
+fn curves(k: usize, segment: &SegmentEntry) -> Markup {
     html! {
         details open[k < 3] {
-            summary { (stretch.about) " (" (stretch.log) ")" }
+            summary { (segment.about) " (" (segment.log) ")" }
             div.plots {
-                @for (j, tracks) in stretch.joints.iter().enumerate() {
+                @for (j, tracks) in segment.joints.iter().enumerate() {
                     figure {
                         figcaption { (tracks.quantity) }
-                        div.plot tabindex="0" role="img" aria-label=(tracks.quantity) data-stretch=(k) data-joint=(j) {}
+                        div.plot tabindex="0" role="img" aria-label=(tracks.quantity) data-segment=(k) data-joint=(j) {}
                     }
                 }
             }
@@ -44,27 +44,31 @@ fn curves(k: usize, stretch: &StretchEntry) -> Markup {
     }
 }
 
-fn clouds(report: &Report, k: usize, cloud: &CloudEntry) -> Markup {
-    let number = cloud.joint;
+fn scatters(report: &Report, k: usize, scatter: &ScatterEntry) -> Markup {
+    let number = scatter.joint;
     let axes = [
-        ("q", &cloud.q, format!("q{number}, {}", cloud.units[0])),
-        ("qd", &cloud.qd, format!("qd{number}, {}", cloud.units[1])),
+        ("q", &scatter.q, format!("q{number}, {}", scatter.units[0])),
+        (
+            "qd",
+            &scatter.qd,
+            format!("qd{number}, {}", scatter.units[1]),
+        ),
         (
             "tau",
-            &cloud.tau,
-            format!("tau{number}, {}", cloud.units[2]),
+            &scatter.tau,
+            format!("tau{number}, {}", scatter.units[2]),
         ),
-        ("time", &cloud.time, "time, s".to_owned()),
+        ("time", &scatter.time, "time, s".to_owned()),
     ];
-    // Over what never changes there is nothing to see.
+    // A plot over a variable that never changes shows nothing.
     let varies = |values: &[f64]| values.iter().any(|value| *value != values[0]);
     html! {
         h4 { "Joint " (report.label(number)) }
         div.plots.small-plots {
             @for (key, _, axis) in axes.iter().filter(|(_, values, _)| varies(values)) {
                 figure {
-                    figcaption { "force, " (cloud.units[2]) ", over " (axis) }
-                    div.plot tabindex="0" role="img" aria-label={ "residual force over " (axis) } data-cloud=(k) data-over=(key) {}
+                    figcaption { "force, " (scatter.units[2]) ", over " (axis) }
+                    div.plot tabindex="0" role="img" aria-label={ "residual force over " (axis) } data-scatter=(k) data-over=(key) {}
                 }
             }
         }

@@ -7,7 +7,7 @@ use super::calibration::calibration;
 use super::logs::by_log;
 use super::missing::value;
 use crate::bodies::{poor, sum};
-use crate::remainder::{network, structure};
+use crate::diagnostics::{network, structure};
 use crate::schema::{FitEntry, Report};
 use crate::wording::{FITTED, WITH_EFFECTS, amount, small};
 use residyn_core::data::{Finding, Severity};
@@ -16,7 +16,7 @@ use residyn_core::digits::amount_of;
 pub(super) fn section(report: &Report) -> Section {
     Section {
         id: "trust",
-        question: "May I trust it?",
+        question: "Can I trust it?",
         answer: html! {
             (left(report))
             (alternatives(report))
@@ -37,8 +37,8 @@ fn left(report: &Report) -> Markup {
         @if let Some(proposal) = &report.unexplained.proposal {
             details {
                 summary { "A proposal, not a finding, for joint " (proposal.joint) }
-                p { "Force " code { (proposal.formula) } " takes away " (format!("{:.0} %", 100.0 * proposal.explains))
-                    " of the remainder on stretches left out of its fit. As an effect file:" }
+                p { "Force " code { (proposal.formula) } " removes " (format!("{:.0} %", 100.0 * proposal.explains))
+                    " of the residual on blocks left out of its fit. As an effect file:" }
                 pre tabindex="0" { (proposal.file) }
             }
         }
@@ -61,7 +61,7 @@ fn parameters(report: &Report) -> Markup {
         details open[report.parameters.len() <= MOST_SHOWN] {
             summary { "Values with their 95 % intervals" }
             div.table tabindex="0" { table {
-                thead { tr { th { "parameter" } th { "declared" } th { "fitted without the effects" } th { "final" } th { "told by the logs" } } }
+                thead { tr { th { "parameter" } th { "declared" } th { "fitted without the effects" } th { "final" } th { "identifiable" } } }
                 tbody {
                     @for one in &report.parameters {
                         tr.doubtful[!one.fitted.identifiable] {
@@ -79,14 +79,14 @@ fn parameters(report: &Report) -> Markup {
     }
 }
 
-/// The sums of the bodies' parameters that torques tell.
+/// The sums of the bodies' parameters that torques determine.
 fn bodies(report: &Report) -> Markup {
     let known = &report.identifiability;
     html! {
-        @if known.tellable > 0 {
+        @if known.identifiable_at_most > 0 {
             details {
-                summary { "Bodies: these logs tell " (known.bodies.len()) " of the " (known.tellable) " sums of parameters that any motion could tell" }
-                p { (poor(known.bodies.len(), known.tellable)) }
+                summary { "Bodies: these logs determine " (known.bodies.len()) " of the " (known.identifiable_at_most) " sums of parameters that any motion could determine" }
+                p { (poor(known.bodies.len(), known.identifiable_at_most)) }
                 div.table tabindex="0" { table {
                     thead { tr { th { "body" } th { "sum" } th { "declared" } th { "fitted" } } }
                     tbody {
@@ -124,15 +124,15 @@ fn fits(report: &Report) -> Markup {
     html! {
         h3 { "Fits" }
         ul { (fit(FITTED, &report.fits.before)) (fit(WITH_EFFECTS, &report.fits.after)) }
-        @if report.stopped { p { "The search was stopped when its time was spent." } }
+        @if report.stopped { p { "The search was stopped when its time ran out." } }
     }
 }
 
 fn findings(report: &Report) -> Markup {
     html! {
         h3 { "The logs" }
-        @if told(report).is_empty() { p { "The audit found nothing to warn of." } }
-        @for (log, findings) in told(report) {
+        @if message(report).is_empty() { p { "The audit found nothing to warn about." } }
+        @for (log, findings) in message(report) {
             details {
                 summary { (log) ": " (findings.len()) @if findings.len() == 1 { " finding" } @else { " findings" } }
                 ul { @for finding in findings { li { (finding.to_string()) } } }
@@ -141,8 +141,8 @@ fn findings(report: &Report) -> Markup {
     }
 }
 
-/// What the audit found in each log where it found something, but for remarks.
-fn told(report: &Report) -> Vec<(&str, Vec<&Finding>)> {
+/// What the audit found in each log, except for remarks; logs without findings are left out.
+fn message(report: &Report) -> Vec<(&str, Vec<&Finding>)> {
     let matters = |finding: &&Finding| finding.severity != Severity::Info;
     let of_log = report.audit.iter().map(|audit| {
         let findings = audit.findings.iter().filter(matters).collect();

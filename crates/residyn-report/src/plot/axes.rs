@@ -43,7 +43,7 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// An axis to run over so many pixels from left to right, its numbers apart from one another.
+    /// An axis of the given length in pixels from left to right, its numbers clear of one another.
     pub fn horizontal(range: Range, pixels: f64, quantity: &str, unit: &str) -> Self {
         Self::horizontal_on(Scale::Linear, range, pixels, quantity, unit)
     }
@@ -67,7 +67,7 @@ impl Axis {
         Self::labelled(scale, range, ticks, quantity, unit)
     }
 
-    /// An axis to run over so many pixels from bottom to top.
+    /// An axis of the given length in pixels from bottom to top.
     pub fn vertical(range: Range, pixels: f64, quantity: &str, unit: &str) -> Self {
         let ticks = Ticks::new(range, (pixels / Y_TICK_PX).max(2.0) as usize);
         Self::labelled(Scale::Linear, range, ticks, quantity, unit)

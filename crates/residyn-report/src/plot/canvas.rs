@@ -7,7 +7,7 @@ use svg::node::element::{Circle, Group, Line, Path, Rectangle, SVG, Text, Title}
 
 use super::style::{INK, MARGIN, Stroke, TEXT_SIZE, TITLE_SIZE, WIDTH};
 
-/// Renderers clip what lies outside, but not all of them stand coordinates of any size.
+/// Renderers clip what lies outside, but not all of them tolerate coordinates of any size.
 const FARTHEST_PX: f64 = 1e4;
 
 /// Bold letters are wider by about this factor.
@@ -32,7 +32,7 @@ impl Area {
     }
 }
 
-/// Which point of a text its position names.
+/// The point of a text that its position refers to.
 #[derive(Clone, Copy)]
 pub(crate) enum Anchor {
     Start,
@@ -187,7 +187,7 @@ pub(crate) fn marker((x, y): (f64, f64), radius: f64, colour: &str) -> Circle {
         .set("stroke", "white")
 }
 
-/// Width that a text will about take, in a wide sans-serif font: digits are wider there than letters on average.
+/// Approximate width of a text in a wide sans-serif font, where digits are wider than letters on average.
 pub(crate) fn text_width(content: &str, size: f64) -> f64 {
     let share = |letter: char| {
         if letter.is_alphabetic() || letter == ' ' {

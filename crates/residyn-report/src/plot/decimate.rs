@@ -21,14 +21,14 @@ pub fn decimate(points: &[(f64, f64)], limit: usize) -> Vec<(f64, f64)> {
     kept
 }
 
-/// The places between which straight lines are at most `off` away from every curve over `x`, the ends among them.
+/// The places between which straight lines are at most `off` away from every curve over `x`, including the ends.
 pub(crate) fn bends(x: &[f64], curves: &[Vec<f64>], off: f64) -> Vec<usize> {
     let last = x.len() - 1;
     let inner = bends_between(x, curves, off, 0, last);
     [vec![0], inner, vec![last]].concat()
 }
 
-/// The inner ones (Ramer 1972; Douglas and Peucker 1973).
+/// The inner places (Ramer 1972; Douglas and Peucker 1973).
 fn bends_between(
     x: &[f64],
     curves: &[Vec<f64>],

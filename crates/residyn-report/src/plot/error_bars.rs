@@ -32,7 +32,7 @@ pub struct ErrorRow {
     pub kind: JointKind,
     /// How far ahead the models predict.
     pub horizon_s: f64,
-    /// One a model, from the top.
+    /// One per model, from the top.
     pub bars: Vec<Bar>,
 }
 
@@ -45,9 +45,10 @@ pub struct Bar {
     pub error: f64,
 }
 
-/// Draws one panel a joint or rig, in the order of the rows: for each horizon a bar a model, with its number at the end.
+/// Draws one panel per joint or rig, in the order of the rows: for each horizon one bar per model, with its number at
+/// the end.
 ///
-/// Each has an axis of its own: what compares is the models, and the error of one joint can be many times another's.
+/// Each has its own axis: the models are compared, not the joints, and one joint's error can be many times another's.
 /// An error that is not finite is written out as diverged.
 pub fn error_bars(rows: &[ErrorRow], title: &str) -> Result<String, PlotError> {
     let (mut canvas, mut top) = begin(title, rows, entries)?;
@@ -63,7 +64,7 @@ fn entries(rows: &[ErrorRow]) -> Vec<Entry> {
         .collect()
 }
 
-/// Draws the rows of one panel from `top` on, and says where their frame ends.
+/// Draws the rows of one panel from `top` down, and returns where their frame ends.
 fn draw_panel(canvas: &mut Canvas, rows: &[ErrorRow], top: f64) -> f64 {
     let Some(ErrorRow { of, kind, .. }) = rows.first() else {
         return top;
@@ -104,7 +105,7 @@ fn draw_panel(canvas: &mut Canvas, rows: &[ErrorRow], top: f64) -> f64 {
     area.bottom()
 }
 
-/// Draws the bars of one horizon from `top` on, and says where they end. The axis counts errors times `factor`.
+/// Draws the bars of one horizon from `top` down, and returns where they end. The axis counts errors times `factor`.
 fn draw_group(canvas: &mut Canvas, frame: &Frame, row: &ErrorRow, factor: f64, top: f64) -> f64 {
     let left = frame.area.x;
     let mut next = top;
@@ -158,7 +159,7 @@ fn break_mark(x: f64, y: f64) -> svg::node::element::Path {
     curves([&[(x, y + BAR_PX + 1.0), (x + 6.0, y - 1.0)][..]], &gap)
 }
 
-/// What of an error a bar can show.
+/// The part of an error that a bar can show.
 fn drawable(error: f64) -> f64 {
     if error.is_finite() {
         error.clamp(0.0, LONGEST_BAR)
@@ -175,7 +176,7 @@ fn written(error: f64, kind: JointKind) -> String {
     format!("{} {unit}", three_digits(factor * error))
 }
 
-/// Thousandths below one: their number, and the unit's name.
+/// The factor and the unit's name: errors below one are in thousandths.
 fn readable(error: f64, unit: &str) -> (f64, String) {
     if error < 1.0 {
         (1e3, format!("m{unit}"))

@@ -18,7 +18,7 @@ const MAX_DOTS: usize = 40;
 /// A band without a width still shows as a line of this width.
 const BAND_EDGE_PX: f64 = 0.8;
 
-/// Dashes beside those that carry a name.
+/// Dashes of the further methods.
 const OTHER_DASHES: [&str; 4] = ["8 3 2 3", "3 3", "12 4", "8 3 2 3 2 3"];
 
 /// How the model that a planner uses came about.
@@ -32,12 +32,12 @@ pub enum Method {
     Hybrid,
     /// The simulated plant itself.
     Perfect,
-    /// A further one, counted from 0.
+    /// A further method, counted from 0.
     Other(usize),
 }
 
 impl Method {
-    /// The prior and the hybrid have the colours of their roles; the others are told apart by dashes too.
+    /// The prior and the hybrid have the colours of their roles; dashes distinguish the others as well.
     fn stroke(self) -> Stroke {
         let (colour, width, dash) = match self {
             Self::Prior => (VERMILION, 1.9, "6 3.5"),
@@ -68,7 +68,7 @@ pub struct Spread {
 /// How a result depends on the amount of data.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Course {
-    /// The result at each amount, in increasing order of it.
+    /// The result at each amount of data, in increasing order.
     Over(Vec<(f64, Spread)>),
     /// The same at every amount: nothing is learned.
     Level(Spread),
@@ -86,7 +86,7 @@ pub struct MethodCurve {
 /// The methods on one task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LearningPanel {
-    /// What stands above it.
+    /// The heading above it.
     pub title: String,
     /// The amount of data.
     pub x: Quantity,
@@ -100,7 +100,7 @@ pub struct LearningPanel {
 /// Draws the panels side by side, three in a row at most: for each method a line through the means, in a band of
 /// one standard deviation to either side.
 ///
-/// Axes cover all bands. Points that are not finite leave a gap, on a logarithmic axis those at zero and below too;
+/// Axes cover all bands. Points that are not finite leave a gap, as do points at zero and below on a logarithmic axis;
 /// a remark counts them.
 ///
 /// # Errors
@@ -125,7 +125,7 @@ pub fn learning_curves(panels: &[LearningPanel], title: &str) -> Result<String, 
     Ok(canvas.finish(top + 6.0))
 }
 
-/// As many as give rows of about equal length.
+/// The number of columns that gives rows of about equal length.
 fn columns(panels: usize) -> usize {
     panels.div_ceil(panels.div_ceil(MAX_COLUMNS))
 }
@@ -256,7 +256,7 @@ fn with_lines(inner: SVG, frame: &Frame, pieces: &[Vec<(f64, Spread)>], stroke: 
     inner.add(curves(lines.iter().map(Vec::as_slice), &stroke))
 }
 
-/// Says what the frame does not show.
+/// Counts what the frame does not show.
 fn add_remark(canvas: &mut Canvas, frame: &Frame, panel: &LearningPanel) {
     if panel.curves.is_empty() {
         canvas.add(no_data(frame.area));

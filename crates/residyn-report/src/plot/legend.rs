@@ -10,7 +10,7 @@ const SAMPLE_PX: f64 = 30.0;
 const ROW_PX: f64 = 21.0;
 const ENTRY_GAP_PX: f64 = 26.0;
 
-/// The sample drawn beside a name.
+/// The sample drawn next to a name.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Sample {
     Line(Stroke),
@@ -69,7 +69,7 @@ pub(crate) fn with_key(title: &str, entries: Vec<Entry>) -> (Canvas, f64) {
     (canvas, end)
 }
 
-/// Draws the entries from `top` on, and says where they end.
+/// Draws the entries from `top` down, and returns where they end.
 fn legend(entries: &[Entry], top: f64) -> (Group, f64) {
     let mut drawn = Group::new();
     let (mut x, mut middle) = (MARGIN, top + ROW_PX / 2.0);

@@ -39,7 +39,7 @@ pub enum PlotError {
     },
     /// Frames of an animation that do not belong together.
     #[error(
-        "animation {title:?}: chain {chain} changes its number of points, or its number of frames is not that of chain 1; give every frame of a chain the same points, and every chain the same frames"
+        "animation {title:?}: chain {chain} changes its number of points, or its number of frames differs from that of chain 1; give every frame of a chain the same points, and every chain the same frames"
     )]
     Uneven {
         /// The animation's title.

@@ -40,7 +40,7 @@ pub struct Panel {
     pub tracks: Vec<Track>,
 }
 
-/// Draws one panel a joint, stacked over a common time axis.
+/// Draws one panel per joint, stacked over a common time axis.
 ///
 /// A prediction that runs away does not squeeze the others: the axis ends one measured range beyond the measured
 /// range, and a remark counts the points that lie outside. Points that are not finite leave a gap and are counted
@@ -175,7 +175,7 @@ fn add_remark(canvas: &mut Canvas, frame: &Frame, panel: &Panel) {
     }
 }
 
-/// The pieces of a curve in pixels, thinned, and parted where a point is not finite.
+/// The pieces of a curve in pixels, thinned, and split where a point is not finite.
 fn visible_lines(track: &Track, frame: &Frame) -> Vec<Vec<(f64, f64)>> {
     let total = track_points(track).count().max(1);
     let pieces = track

@@ -35,16 +35,16 @@ pub struct ShapeCurve {
     pub high: Vec<f64>,
 }
 
-/// What one model leaves of the force on a joint.
+/// What one model leaves unexplained of the force on a joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShapeModel {
     /// Which model.
     pub role: Role,
     /// Name in the legend.
     pub label: String,
-    /// One point a window.
+    /// One point per window.
     pub samples: Vec<ShapeSample>,
-    /// In the order of the samples' values; none where a variable stays the same.
+    /// In the order of the samples' values; none for a variable that stays the same.
     pub curves: [Option<ShapeCurve>; 4],
 }
 
@@ -67,15 +67,15 @@ struct Shown<'a> {
     curve: Option<&'a ShapeCurve>,
 }
 
-/// What a panel of a row has along its lower side.
+/// What a panel in a row shows along its lower side.
 struct Column {
     quantity: String,
     unit: &'static str,
 }
 
-/// Draws one row a joint: residual force against position, velocity, torque and time.
+/// Draws one row per joint: residual force against position, velocity, torque and time.
 ///
-/// The axes cover the middle 98 % of the values; a remark counts the points outside. Large clouds are thinned
+/// The axes cover the middle 98 % of the values; a remark counts the points outside. Large scatters are thinned
 /// evenly.
 pub fn residual_shape(panels: &[ShapePanel], title: &str) -> Result<String, PlotError> {
     let (mut canvas, mut top) = begin(title, panels, entries)?;
@@ -142,7 +142,7 @@ fn draw_row(canvas: &mut Canvas, panel: &ShapePanel, top: f64) {
     }
 }
 
-/// Of each set on its own, so that a large one does not push a small one off the axis; zero is always on it.
+/// Quantiles are taken per set, so that a large set does not push a small one off the axis; zero is always on it.
 fn force_range(panel: &ShapePanel) -> Range {
     let ranges = panel.models.iter().filter_map(|model| {
         let forces = model.samples.iter().map(|sample| sample.residual);

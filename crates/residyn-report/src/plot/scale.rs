@@ -2,7 +2,7 @@
 
 use residyn_core::data::statistics::quantile;
 
-/// An axis ends here, so that its width is still a number.
+/// An axis ends here, so that its width stays finite.
 const FARTHEST: f64 = 1e300;
 /// A logarithmic axis spans at most from the inverse of this power of ten to the power itself.
 const FARTHEST_DECADE: f64 = 300.0;
@@ -15,7 +15,7 @@ pub(crate) struct Range {
 }
 
 impl Range {
-    /// From the lowest to the highest finite value; none when there is none.
+    /// From the lowest to the highest finite value; none if no value is finite.
     pub fn spanning(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         values.into_iter().filter(|value| value.is_finite()).fold(
             None,
@@ -67,7 +67,7 @@ impl Range {
         (self.lo..=self.hi).contains(&value)
     }
 
-    /// Opened by a share of the width at both ends.
+    /// Widened by a share of the width at both ends.
     pub fn widened(self, share: f64) -> Self {
         let margin = share * self.width();
         Self {
@@ -76,7 +76,7 @@ impl Range {
         }
     }
 
-    /// As wide as asked for, around the same middle.
+    /// Of the given width, around the same middle.
     pub fn around_middle(self, width: f64) -> Self {
         let middle = f64::midpoint(self.lo, self.hi);
         Self {
@@ -85,7 +85,7 @@ impl Range {
         }
     }
 
-    /// A range that an axis can show: one without a width, or with one lost in rounding, is opened around its value.
+    /// A range that an axis can show: a range whose width is zero or lost in rounding is widened around its value.
     pub fn drawable(self) -> Self {
         let [lo, hi] = [self.lo, self.hi].map(|end| end.clamp(-FARTHEST, FARTHEST));
         let size = lo.abs().max(hi.abs());
@@ -138,7 +138,7 @@ impl Scale {
         }
     }
 
-    /// A range opened by a share of its length on the axis at both ends.
+    /// A range widened by a share of its length on the axis at both ends.
     pub(crate) fn widened(self, range: Range, share: f64) -> Range {
         let Range { lo, hi } = self.stretched(range).widened(share);
         Range {
@@ -155,7 +155,7 @@ impl Scale {
     }
 }
 
-/// Where an axis has its marks, and what stands at them.
+/// Where an axis has its marks, and their labels.
 pub(crate) struct Ticks {
     pub values: Vec<f64>,
     pub labels: Vec<String>,
@@ -169,7 +169,7 @@ impl Ticks {
         let step = round_step(range.width() / wanted.max(1) as f64);
         let (first, last) = ((range.lo / step).ceil(), (range.hi / step).floor());
         let count = (last - first).clamp(-1.0, 100.0) as i32 + 1;
-        // A whole number times the step: adding the step up would gather rounding errors.
+        // A whole number times the step: adding up the step would accumulate rounding errors.
         let values: Vec<f64> = (0..count).map(|i| (first + f64::from(i)) * step).collect();
         let exponent = axis_exponent(&values);
         let unit = 10_f64.powi(exponent);
@@ -186,7 +186,7 @@ impl Ticks {
     }
 
     /// At most `wanted` marks at 1, 2 and 5 times the powers of ten, or at powers of ten alone. A range that holds
-    /// fewer than two has the marks of a linear axis.
+    /// fewer than two marks gets those of a linear axis.
     fn logarithmic(range: Range, wanted: usize) -> Self {
         let Range { lo, hi } = Scale::Logarithmic.stretched(range);
         let decades = lo.floor() as i32..=hi.floor() as i32;

@@ -20,7 +20,7 @@ pub(crate) const VERMILION: &str = "#d55e00";
 pub(crate) const BLUE: &str = "#0072b2";
 pub(crate) const GREEN: &str = "#009e73";
 
-/// What is left of the same palette.
+/// The rest of the same palette.
 pub(crate) const OTHERS: [&str; 4] = ["#cc79a7", "#56b4e9", "#e69f00", "#999999"];
 
 /// How a line is drawn.
@@ -33,7 +33,7 @@ pub(crate) struct Stroke {
 }
 
 impl Role {
-    /// Colours of Okabe and Ito (2008), told apart by colour-blind readers; their vermilion in place of their
+    /// Colours of Okabe and Ito (2008), which colour-blind readers can distinguish; their vermilion in place of their
     /// orange, which is too pale for a thin line on white.
     pub(crate) fn colour(self) -> &'static str {
         match self {
@@ -45,7 +45,7 @@ impl Role {
         }
     }
 
-    /// Dashes too differ, for print without colour. The log is a broad grey band that good predictions run on, so
+    /// Dashes differ as well, for print without colour. The log is a broad grey band that good predictions run on, so
     /// that neither hides the other; the hybrid is dotted, to show the line that it mostly lies on.
     pub(crate) fn stroke(self) -> Stroke {
         let (colour, width, dash) = match self {

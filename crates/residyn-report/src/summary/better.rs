@@ -4,17 +4,17 @@ use super::{listed, paragraph};
 use crate::accuracy::{fitted_tests, is_some_reduction, position_unit};
 use crate::schema::{ModelError, Report, TorqueEntry};
 use crate::wording::{WITH_FRICTION, small};
-use residyn_core::closeloop::Space;
+use residyn_core::closeloop::ErrorModel;
 use residyn_core::data::Joint;
 
-/// Rows of the table at most, beside that of all joints.
+/// Most rows of the table, not counting the row of all joints.
 const ROWS: usize = 7;
-/// Other models that are listed at most.
+/// Most other models that are listed.
 const OTHERS: usize = 2;
 
 pub(super) fn lines(report: &Report) -> Vec<String> {
     let mut lines = match (report.compared, &report.torque) {
-        (Space::Torque, Some(torque)) => of_torques(report, torque),
+        (ErrorModel::InverseDynamics, Some(torque)) => of_torques(report, torque),
         _ => of_motion(report),
     };
     let fitted = fitted_tests(report).into_iter();

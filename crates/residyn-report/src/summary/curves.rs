@@ -1,8 +1,8 @@
 //! Small curves of block characters.
 
 use super::paragraph;
+use crate::plot_data::SeriesEntry;
 use crate::schema::Report;
-use crate::shown::TracksEntry;
 use crate::wording::small;
 
 /// From nothing to the largest value.
@@ -10,13 +10,13 @@ const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█
 /// Width of a curve \[characters\].
 const COLUMNS: usize = 60;
 
-/// The error of the fitted declared model and of the one with effects along a part of a test log, of the joint on which the first
-/// errs most beside what the joint does. Empty where the report shows no curves.
+/// The errors of the fitted declared model and of the model with effects along a part of a test log, for the joint on
+/// which the former errs most relative to the joint's motion. Empty if the report shows no curves.
 pub fn curves(report: &Report) -> Vec<String> {
-    let Some(stretch) = report.shown.stretches.first() else {
+    let Some(segment) = report.plots.segments.first() else {
         return Vec::new();
     };
-    let joints = stretch.joints.iter().map(Errors::of);
+    let joints = segment.joints.iter().map(Errors::of);
     let Some(errors) = joints.max_by(|a, b| a.share.total_cmp(&b.share)) else {
         return Vec::new();
     };
@@ -25,12 +25,12 @@ pub fn curves(report: &Report) -> Vec<String> {
         return Vec::new();
     }
     let [start, end] =
-        [stretch.time.first(), stretch.time.last()].map(|t| t.copied().unwrap_or(0.0));
+        [segment.time.first(), segment.time.last()].map(|t| t.copied().unwrap_or(0.0));
     let title = format!(
         "error up to {} of {}, {start:.1} to {end:.1} s of {}:",
         small(top),
         errors.quantity,
-        stretch.log
+        segment.log
     );
     let mut lines = paragraph("  ", &title);
     lines.push(format!("  {:<14}{}", "fitted", curve(&errors.before, top)));
@@ -42,17 +42,17 @@ pub fn curves(report: &Report) -> Vec<String> {
     lines
 }
 
-/// Distances of predictions from what was measured, where there are any.
+/// Distances of predictions from the measurement, where there are any.
 struct Errors<'r> {
     quantity: &'r str,
     before: Vec<Option<f64>>,
     after: Vec<Option<f64>>,
-    /// Largest error of the first over the largest value measured.
+    /// Largest error before over the largest value measured.
     share: f64,
 }
 
 impl<'r> Errors<'r> {
-    fn of(tracks: &'r TracksEntry) -> Self {
+    fn of(tracks: &'r SeriesEntry) -> Self {
         let error = |predicted: &[Option<f64>]| -> Vec<Option<f64>> {
             let both = tracks.measured.iter().zip(predicted);
             both.map(|(m, p)| Some(((*m)? - (*p)?).abs())).collect()

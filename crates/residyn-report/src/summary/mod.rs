@@ -1,5 +1,5 @@
 //! The answer for a terminal, in some thirty lines of eighty characters: the story of `report.html`, question by question.
-//! Sentences are broken into lines and never cut; of many things the first are listed.
+//! Sentences are wrapped and never cut; long lists show their first entries.
 
 mod better;
 mod curves;
@@ -19,12 +19,12 @@ pub use self::curves::curves;
 const WIDTH: usize = 80;
 /// With more lines than this no curves are drawn.
 const LINES: usize = 30;
-/// Lines about effects at most, beyond which they are listed in a line each.
+/// Most lines about effects; beyond that, each effect gets one line.
 const EFFECTS: usize = 5;
 
-/// How the program that shows an answer calls what its reader can do.
+/// How the program that shows an answer words what its reader can do.
 pub struct Words<'w> {
-    /// What mends a finding about a log.
+    /// What fixes a finding about a log.
     pub remedy: &'w dyn Fn(&Remedy) -> String,
     /// Predict another log with a model file.
     pub predict: &'w dyn Fn(&Path) -> String,
@@ -45,7 +45,7 @@ pub fn answer(report: &Report) -> String {
 }
 
 /// The answer for a terminal: a few lines, and where the rest is. `seconds` is how long each stage took; `drawn` are [`curves`],
-/// or none, and stand where there is room for them.
+/// or none, and appear if there is room for them.
 pub fn summary(
     report: &Report,
     seconds: &[(Stage, f64)],
@@ -75,14 +75,14 @@ fn head(report: &Report, words: &Words<'_>) -> Vec<String> {
             0 => String::new(),
             more => format!(" (and {more} more in report.md)"),
         };
-        let told = finding.told(words.remedy);
-        format!("Serious, to be mended first{more}: {log}: {told}")
+        let message = finding.message(words.remedy);
+        format!("Serious, to be fixed first{more}: {log}: {message}")
     });
     let first = first.map_or_else(Vec::new, |text| paragraph("", &text));
     [first, paragraph("", &answer(report))].concat()
 }
 
-/// The effects with their sizes; one line each where there are many.
+/// The effects with their sizes; one line each if there are many.
 fn missing(report: &Report) -> Vec<String> {
     if report.effects.is_empty() {
         return Vec::new();
@@ -108,14 +108,14 @@ fn missing(report: &Report) -> Vec<String> {
 
 /// What to do next.
 fn next(report: &Report, folder: &Path, words: &Words<'_>) -> String {
-    let told = if report.serious().next().is_some() {
-        "mend the logs; `residyn audit` says how".to_owned()
+    let message = if report.serious().next().is_some() {
+        "fix the logs; `residyn audit` says how".to_owned()
     } else if let Some(rival) = report.alternatives.first() {
         format!("to rule out {}: {}", rival.title, rival.experiment)
     } else {
         (words.predict)(&folder.join(&report.files.model))
     };
-    format!("What next? {told}")
+    format!("What next? {message}")
 }
 
 /// Where the rest is; a path is never cut.
@@ -123,7 +123,7 @@ fn files(seconds: &[(Stage, f64)], folder: &Path) -> String {
     let all: f64 = seconds.iter().map(|(_, seconds)| seconds).sum();
     let page = folder.join(PAGE);
     format!(
-        "Took {all:.1} s. Open {}; model and plots are beside it",
+        "Took {all:.1} s. Open {}; model and plots are next to it",
         page.display()
     )
 }

@@ -2,10 +2,10 @@
 
 use super::paragraph;
 use crate::calibration;
-use crate::remainder::{proposal_line, structure};
+use crate::diagnostics::{proposal_line, structure};
 use crate::schema::{EffectEntry, Report};
 
-/// Remarks beside what is left.
+/// Most remarks besides the residual.
 const REMARKS: usize = 2;
 
 pub(super) fn lines(report: &Report) -> Vec<String> {
@@ -19,7 +19,7 @@ pub(super) fn lines(report: &Report) -> Vec<String> {
     ];
     let remarks = remarks.into_iter().flatten().take(REMARKS);
     let remarks = remarks.flat_map(|text| paragraph("  ", &text));
-    let title = vec!["May I trust it?".to_owned()];
+    let title = vec!["Can I trust it?".to_owned()];
     [title, paragraph("  ", &structure(report))]
         .into_iter()
         .flatten()
@@ -27,11 +27,11 @@ pub(super) fn lines(report: &Report) -> Vec<String> {
         .collect()
 }
 
-/// Effects that are told by the training logs, and raise the error on the test logs by more than a percent.
+/// Effects that the training logs establish, but that raise the error on the test logs by more than a percent.
 fn harmful(report: &Report) -> Option<String> {
     let raise = |effect: &EffectEntry| {
         let rise = -effect.error_reduction?;
-        let told = || {
+        let message = || {
             format!(
                 "{} on joint {} (by {:.0} %)",
                 effect.title,
@@ -39,7 +39,7 @@ fn harmful(report: &Report) -> Option<String> {
                 100.0 * rise
             )
         };
-        (rise > 0.01).then(told)
+        (rise > 0.01).then(message)
     };
     let effects: Vec<String> = report.effects.iter().filter_map(raise).collect();
     (!effects.is_empty())
@@ -54,7 +54,7 @@ fn held(report: &Report) -> Option<String> {
     let known = &report.identifiability;
     (!known.held.is_empty()).then(|| {
         format!(
-            "held, since the logs do not tell them: {}",
+            "held, since the logs do not determine them: {}",
             known.held.join(", ")
         )
     })

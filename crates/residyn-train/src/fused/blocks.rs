@@ -1,8 +1,8 @@
 use residyn_core::lanes::Row;
 use residyn_core::sim::batch::{Rows, W};
 
-/// Segments in blocks of [`W`], one in each lane. The last segment is repeated to fill the last block, where the
-/// copies do not count.
+/// Segments in blocks of [`W`], one in each lane. The last segment is repeated to fill the last block, and the copies
+/// do not count.
 #[derive(Debug)]
 pub struct Blocks {
     pub(super) joints: usize,
@@ -10,7 +10,7 @@ pub struct Blocks {
     /// Number of segments.
     pub(super) size: usize,
     rows: Vec<Rows>,
-    /// 1 where a row of the last block counts, else 0.
+    /// 1 if a row of the last block counts, else 0.
     last: Rows,
 }
 
@@ -29,8 +29,8 @@ pub(super) struct StepData<'a> {
 }
 
 impl Blocks {
-    /// Blocks of `size` segments; `values` are those of a segment: for each step the state, the input, the length and
-    /// the start of the step, and after them the last state.
+    /// Blocks of `size` segments; `segment` gives a segment's values: for each step, the state, the input, and the
+    /// step's length and start, followed by the last state.
     pub(crate) fn new(
         joints: usize,
         steps: usize,
@@ -87,12 +87,12 @@ impl Blocks {
         }
     }
 
-    /// Rows of a step.
+    /// Number of rows of a step.
     fn step_rows(&self) -> usize {
         3 * self.joints + 2
     }
 
-    /// Rows of a block.
+    /// Number of rows of a block.
     fn stride(&self) -> usize {
         self.steps * self.step_rows() + 2 * self.joints
     }

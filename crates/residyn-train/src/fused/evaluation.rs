@@ -46,7 +46,7 @@ pub(super) struct Evaluation {
 }
 
 impl Workers {
-    /// Calls `body` with all cores available to the losses in it. Outside of this call losses run on one thread.
+    /// Calls `body` with all cores available to the losses in it. Outside this call, losses run on one thread.
     pub(crate) fn with_workers<R>(&self, body: impl FnOnce() -> R) -> R {
         self.pool.with_workers(&|part| self.run_part(part), body)
     }
@@ -117,7 +117,7 @@ impl Evaluation {
         };
         evaluation.run(Pass::Forward);
         let count = evaluation.problem.count();
-        // In the order of the parts, so that the result does not depend on which was finished first.
+        // In the order of the parts, so that the result does not depend on which finished first.
         let sums = evaluation.buffers.parts.iter().map(|part| lock(part).sums);
         let [error, square] = sums.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
         let norm = match evaluation.problem.structure.has_residual {
@@ -128,7 +128,7 @@ impl Evaluation {
         evaluation
     }
 
-    /// From the derivatives of a quantity by the two parts of the loss to those by the learnable numbers.
+    /// From the derivatives of a quantity by the two parts of the loss to its derivatives by the learnable numbers.
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
     pub(super) fn derivative(&self, by_loss: [f32; 2]) -> Vec<f32> {
         let (problem, norm) = (&self.problem, self.loss[1]);
@@ -159,7 +159,7 @@ impl Drop for Evaluation {
     }
 }
 
-/// A lock is poisoned only where a thread panicked, which ends the training.
+/// A lock is poisoned only if a thread panicked, which ends the training.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

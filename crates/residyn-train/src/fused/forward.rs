@@ -13,7 +13,7 @@ use residyn_core::sim::Stage;
 use residyn_core::sim::batch::{Rows, W};
 
 impl<S: Simd> Rollout<'_, S> {
-    /// Rolls the chunk out. Returns the sums over its rows and steps of the squared error and of the squared residual.
+    /// Rolls the chunk out. Returns the sums of the squared error and of the squared residual over its rows and steps.
     #[inline(always)]
     pub(super) fn forward(
         &self,

@@ -1,5 +1,5 @@
 //! The loss and its derivative in one pass each: rollout, networks and penalty together, many rows at a time, on all
-//! cores. The composed operations of [`composed`](super::composed) are its reference, and used on other devices.
+//! cores. The composed operations of [`composed`](super::composed) are its reference, and are used on other devices.
 
 mod blocks;
 mod evaluation;

@@ -1,6 +1,6 @@
 //! The fused loss as an operation of Burn's graph.
 
-// `train::Backend` says why this backend.
+// `train::Backend` explains the choice of backend.
 #![allow(deprecated)]
 
 use std::sync::{Arc, Mutex};
@@ -17,8 +17,8 @@ use super::evaluation::{Evaluation, Workers};
 use super::problem::Problem;
 use crate::hybrid::{numbers_of, primitive};
 
-/// Sums of E and ||F_r||, each with these weights, as a tensor `[sums]`; and the two alone. `numbers` are the learnable ones in
-/// the order of [`HybridModel::flat`](crate::HybridModel::flat).
+/// Weighted sums of E and ||F_r||, one for each pair of weights, as a tensor `[sums]`; and the two alone. `numbers` are
+/// the learnable numbers in the order of [`HybridModel::flat`](crate::HybridModel::flat).
 pub(crate) fn loss(
     numbers: Tensor<1>,
     problem: Problem,
@@ -37,13 +37,13 @@ pub(crate) fn loss(
     (Tensor::from_dispatch(loss), parts)
 }
 
-/// All of the operation but the learnable numbers.
+/// Everything in the operation but the learnable numbers.
 #[derive(Debug, Clone)]
 struct LossTask {
     problem: Arc<Problem>,
     workers: Arc<Workers>,
     sums: Vec<[f32; 2]>,
-    /// Where E and ||F_r|| are left.
+    /// Receives E and ||F_r||.
     parts: Arc<Mutex<[f64; 2]>>,
 }
 
@@ -52,7 +52,7 @@ impl LossTask {
         let evaluation = Evaluation::new(self.problem, self.workers, &numbers_of(numbers));
         let loss = evaluation.loss;
         *self.parts.lock().expect("no other thread uses it") = loss.map(f64::from);
-        // What has no weight does not count, be it infinite.
+        // A part with zero weight does not count, even if infinite.
         let weighted = |(weight, part): (&f32, f32)| match *weight {
             0.0 => 0.0,
             weight => weight * part,
@@ -68,7 +68,7 @@ impl LossTask {
 }
 
 /// What the derivative needs.
-// Burn asks for a state that can be cloned; it is used once.
+// Burn requires a state that can be cloned; it is used once.
 #[derive(Debug, Clone)]
 struct Evaluated {
     evaluation: Arc<Mutex<Evaluation>>,

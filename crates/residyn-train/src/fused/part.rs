@@ -12,11 +12,11 @@ use crate::Structure;
 use residyn_core::lanes::{Element, Vector};
 use residyn_core::sim::batch::Rows;
 
-/// One thread's share of a loss, with buffers that are used again for the next loss.
+/// One thread's share of a loss, with buffers that are reused for the next loss.
 #[derive(Debug)]
 pub(super) struct Part {
     blocks: Range<usize>,
-    /// The records of all chunks or, where these are not kept, of one at a time.
+    /// The records of all chunks or, if these are not kept, of one chunk at a time.
     records: Vec<Rows>,
     programs: Programs,
     workspace: Workspace,
@@ -32,7 +32,7 @@ pub(super) struct Part {
 pub(super) enum Pass {
     /// The sums that the loss is made of.
     Forward,
-    /// The derivatives by all learnable numbers, from those by the two sums.
+    /// The derivatives by all learnable numbers, from the derivatives by the two sums.
     Reverse([f32; 2]),
 }
 

@@ -6,14 +6,14 @@ use crate::Structure;
 use residyn_core::sim::Integrator;
 use residyn_core::sim::batch::{Network, Rows};
 
-/// Blocks of rows that a thread takes through the model together: enough to share the reading of weights, and few
+/// Blocks of rows that a thread takes through the model together: enough to amortise reading the weights, and few
 /// enough that their intermediate values stay in the processor's cache.
 pub(super) const CHUNK: usize = 8;
 
-/// Rows in 1 GiB of records.
+/// Number of rows in 1 GiB of records.
 pub(super) const RECORD_LIMIT: usize = (1 << 30) / size_of::<Rows>();
 
-/// A loss but for the learnable numbers: model, data, integrator and units of the errors.
+/// A loss without the learnable numbers: model, data, integrator and units of the errors.
 #[derive(Debug)]
 pub(crate) struct Problem {
     pub structure: Arc<Structure>,
@@ -50,7 +50,7 @@ impl Problem {
         }
     }
 
-    /// Derivatives of the dynamics that a segment's rollout takes.
+    /// Number of derivatives of the dynamics that a segment's rollout takes.
     pub(super) fn stages(&self) -> usize {
         self.blocks.steps * self.integrator.substeps() * self.integrator.scheme().stages.len()
     }
@@ -60,13 +60,13 @@ impl Problem {
         (self.blocks.size * self.blocks.steps) as f64
     }
 
-    /// Rows of the record of one stage and block.
+    /// Number of rows in the record of one stage and block.
     pub(super) fn recorded_by_stage(&self, networks: &[Network]) -> usize {
         let of_networks = networks.iter().map(|n| n.features() + n.activations());
         2 * self.structure.joints + of_networks.sum::<usize>()
     }
 
-    /// Rows of the record of one block.
+    /// Number of rows in the record of one block.
     pub(super) fn recorded(&self, networks: &[Network]) -> usize {
         let ends = self.blocks.steps * 2 * self.structure.joints;
         self.stages() * self.recorded_by_stage(networks) + ends
@@ -77,7 +77,7 @@ impl Problem {
         self.blocks.count() * self.recorded(networks) <= self.record_limit
     }
 
-    /// The blocks in parts of nearly equal size. They do not depend on the number of threads, so that neither do the
+    /// The blocks in parts of nearly equal size. The parts do not depend on the number of threads, so neither do the
     /// sums over them.
     pub(super) fn parts(&self) -> impl Iterator<Item = Range<usize>> {
         let count = self.blocks.count();

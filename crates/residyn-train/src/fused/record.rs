@@ -1,8 +1,8 @@
 use super::problem::Problem;
 use residyn_core::sim::batch::{Network, Rows};
 
-/// The layout of what the reverse sweep needs from the forward sweep, for the blocks of a chunk: the stages one after
-/// the other, then the state at the end of each step.
+/// The layout of the data that the reverse sweep needs from the forward sweep, for the blocks of a chunk: the stages
+/// one after another, then the state at the end of each step.
 pub(super) struct Layout {
     blocks: usize,
     states: usize,
@@ -14,7 +14,7 @@ pub(super) struct Layout {
 /// One stage, each part `[block][value]`.
 pub(super) struct StageRecord<'a> {
     pub states: &'a mut [Rows],
-    /// Of each network, in the order of the structure's.
+    /// Activations of each network, in the structure's order.
     pub networks: [Activations<'a>; 2],
 }
 
@@ -26,7 +26,7 @@ pub(super) struct Activations<'a> {
 }
 
 impl Layout {
-    /// Of a chunk of `blocks` blocks.
+    /// The layout for a chunk of `blocks` blocks.
     pub(super) fn new(problem: &Problem, networks: &[Network], blocks: usize) -> Self {
         Self {
             blocks,

@@ -55,7 +55,8 @@ impl<S: Simd> Rollout<'_, S> {
         }
     }
 
-    /// Takes `scratch.state` from the derivative by the state at the substep's end to that at its start.
+    /// Takes `scratch.state` from the derivative by the state at the substep's end to the derivative by the state at
+    /// its start.
     #[inline(always)]
     fn substep_back(
         &self,
@@ -113,7 +114,8 @@ impl<S: Simd> Rollout<'_, S> {
         }
     }
 
-    /// The derivative by a stage's rates: through their mean and, but for the last stage, through the states of the next.
+    /// The derivative by a stage's rates: through their mean and, except in the last stage, through the next stage's
+    /// states.
     #[inline(always)]
     fn seed_rates(&self, at: StageIndex, stage: &Stage, last: bool, scratch: &mut Scratch) {
         let states = self.states();

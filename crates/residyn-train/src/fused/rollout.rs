@@ -18,7 +18,7 @@ pub(super) struct Rollout<'a, S> {
     pub layout: Layout,
 }
 
-/// Where a stage stands in the rollout.
+/// The place of a stage in the rollout.
 #[derive(Clone, Copy)]
 pub(super) struct StageIndex {
     pub step: usize,
@@ -72,7 +72,7 @@ impl<S: Simd> Rollout<'_, S> {
         self.layout.stage(record, index, &self.weights.networks)
     }
 
-    /// Whether the residual counts here: at the start of each step.
+    /// Whether the residual is penalised here: at the start of each step.
     pub(super) fn is_penalised(&self, at: StageIndex) -> bool {
         self.problem.structure.has_residual && at.substep == 0 && at.stage == 0
     }

@@ -5,20 +5,20 @@ use crate::Structure;
 use residyn_core::lanes::Element;
 use residyn_core::sim::batch::{Network, Rows};
 
-/// Working memory of both sweeps over a chunk, used again for the next chunk.
+/// Working memory of both sweeps over a chunk, reused for the next chunk.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
     pub scratch: Scratch,
-    /// For each network the derivatives by its features, `[block][feature]`.
+    /// For each network, the derivatives by its features, `[block][feature]`.
     pub by_features: Vec<Vec<Rows>>,
-    /// For each network the derivatives by its weights, a register each.
+    /// For each network, the derivatives by its weights, one register each.
     pub network_sums: Vec<Vec<f32>>,
     /// The derivative by each parameter that is not fixed.
     pub parameter_sums: Vec<Rows>,
 }
 
-/// What the sweeps carry from stage to stage, each part `[block][state]`: values in the forward sweep, derivatives in the
-/// reverse sweep.
+/// Data that the sweeps carry from stage to stage, each part `[block][state]`: values in the forward sweep, derivatives
+/// in the reverse sweep.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     /// The state; the derivative by it.

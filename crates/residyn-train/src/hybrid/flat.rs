@@ -1,7 +1,7 @@
 //! The learnable numbers of a model as one tensor, by one operation of Burn's graph: a reshape of each tensor and their
 //! concatenation would be some forty, each of which takes longer than the numbers take to copy.
 
-// `train::Backend` says why this backend.
+// `train::Backend` explains the choice of backend.
 #![allow(deprecated)]
 
 use std::borrow::Cow;
@@ -20,13 +20,13 @@ use burn::backend::{
 };
 use burn::tensor::{Shape, Tensor, TensorData};
 
-/// Tensors that one operation joins: Burn's operations have a fixed number of inputs.
+/// Largest number of tensors that one operation joins: Burn's operations have a fixed number of inputs.
 const MOST: usize = 20;
 
-/// All entries of these tensors on the processor, one tensor's after the other's and row after row, with their derivatives.
+/// All entries of these tensors on the processor, tensor after tensor and row after row, with their derivatives.
 ///
 /// # Panics
-/// Without tensors, or with some of another backend.
+/// Without tensors, or if some belong to another backend.
 pub(super) fn flattened(mut parts: Vec<DispatchTensor>) -> Tensor<1> {
     assert!(!parts.is_empty(), "there is something to flatten");
     loop {
@@ -77,7 +77,7 @@ where
     DispatchTensor::from_backend(BackendTensor::<B>::Float(primitive))
 }
 
-/// The joined tensor, and how its derivative is taken apart again.
+/// The joined tensor, recorded so that its derivative can be split into parts again.
 fn recorded<C: CheckpointStrategy>(parts: Vec<DispatchTensor>) -> DispatchTensor
 where
     DispatchTensor: DispatchKindConversion<Autodiff<NdArray, C>>,

@@ -12,13 +12,13 @@ use residyn_core::model::{Angles, LayerWeights, MlpWeights, ResidualOn, to_f32 a
 #[derive(Module, Debug)]
 pub struct Mlp {
     pub layers: Vec<Linear>,
-    /// What the layers are made of at first: their shapes, the features and their scaling.
+    /// The initial definition of the layers: their shapes, the features and their scaling.
     #[module(skip)]
     made: Arc<MlpWeights>,
 }
 
 impl Mlp {
-    /// The network with these weights; its tensors are counted from `first`.
+    /// The network with these weights; its tensors are numbered from `first`.
     pub(super) fn new(made: &MlpWeights, first: u64, device: &Device) -> Self {
         let ids = (first..).step_by(2);
         let layers = made.layers.iter().zip(ids);
@@ -41,7 +41,8 @@ impl Mlp {
         weights
     }
 
-    /// The network with the next of these numbers: layer after layer, the weights `[input][output]` before the biases.
+    /// The network with the next numbers of these views: layer after layer, the weights `[input][output]` before the
+    /// biases.
     pub(super) fn with_numbers(&self, views: &mut Views<'_>) -> Self {
         let layers = self.layers.iter().map(|layer| {
             let [inputs, outputs] = layer.weight.dims();
@@ -104,7 +105,7 @@ fn bias(layer: &Linear) -> &Param<Tensor<1>> {
     layer.bias.as_ref().expect("every layer has a bias")
 }
 
-/// A layer with these weights; Burn's are `[input, output]`.
+/// A layer with these weights; Burn stores weights as `[input, output]`.
 fn linear(layer: &LayerWeights, id: u64, device: &Device) -> Linear {
     let shape = [layer.outputs, layer.inputs];
     let weight = tensor(&layer.weight, shape, &device.clone().without_autodiff());

@@ -13,26 +13,26 @@ use residyn_core::model::{
 };
 use residyn_core::sim::Integrator;
 
-/// Burn's identifiers of the tensors: of the physical parameters, and the first of each network. They do not depend on what
-/// was made before, so that an optimiser's record fits a model that is built anew.
+/// Burn's identifiers of the tensors: for the physical parameters, and the first for each network. They do not depend
+/// on what was built before, so that an optimiser's record fits a rebuilt model.
 const PHYSICS_ID: u64 = 1;
 const PRIOR_IDS: u64 = 1 << 32;
 const RESIDUAL_IDS: u64 = 2 << 32;
 
-/// ds/dt = F_p(s, a) + F_r(s, a): what is known, and a network for what is not.
+/// ds/dt = F_p(s, a) + F_r(s, a): known dynamics, and a network for the unknown ones.
 ///
-/// F_p, the prior, is either equations with learnable parameters or itself a network. Leaving out F_r
-/// gives a physics-only or a data-driven model. States are positions then velocities, `2n` columns.
+/// F_p, the prior, is either equations with learnable parameters or itself a network. Leaving out F_r gives a
+/// physics-only or a data-driven model. States are positions, then velocities: `2n` columns.
 ///
-/// It is a Burn module: `loss.backward()`, optimisers, records, visitors, `no_grad` and moves between devices work as with
-/// any other. `physics`, `prior` and `residual` are the paths of its parameter groups.
+/// It is a Burn module: `loss.backward()`, optimisers, records, visitors, `no_grad` and moves between devices work as
+/// with any other module. `physics`, `prior` and `residual` are the paths of its parameter groups.
 #[derive(Module, Debug)]
 pub struct HybridModel {
-    /// The physical parameters, where the prior is equations.
+    /// The physical parameters, if the prior is equations.
     pub physics: Option<Physics>,
-    /// The prior, where it is a network.
+    /// The prior, if it is a network.
     pub prior: Option<Mlp>,
-    /// F_r, where the model has one.
+    /// F_r, if the model has one.
     pub residual: Option<Mlp>,
     #[module(skip)]
     structure: Arc<Structure>,
@@ -45,7 +45,7 @@ impl HybridModel {
     /// [`Backend::device`](crate::Backend::device).
     ///
     /// # Errors
-    /// A parameter that is not finite, outside of its bounds, or without a scale.
+    /// A parameter that is not finite, is outside its bounds, or has no scale.
     pub fn physics(dynamics: &Dynamics, device: &Device) -> Result<Self, HybridError> {
         let physics = Physics::new(dynamics, ParamId::from(PHYSICS_ID), device)?;
         Ok(Self {
@@ -61,7 +61,7 @@ impl HybridModel {
     /// ([`ResidualOn::Derivative`](residyn_core::model::ResidualOn::Derivative)).
     ///
     /// # Errors
-    /// A network that is not one for `joints` joints.
+    /// A network that is not for `joints` joints.
     pub fn network(
         system: &str,
         joints: usize,
@@ -77,10 +77,10 @@ impl HybridModel {
         })
     }
 
-    /// The same model with this residual F_r in place of any that it has.
+    /// The same model with this residual F_r in place of any existing one.
     ///
     /// # Errors
-    /// A network that is not one for the model's joints.
+    /// A network that is not for the model's number of joints.
     pub fn with_residual(self, weights: &MlpWeights) -> Result<Self, HybridError> {
         weights.check(self.joints())?;
         Ok(Self {
@@ -90,7 +90,7 @@ impl HybridModel {
         })
     }
 
-    /// A saved model, on `device`. `dynamics` is what its model file says.
+    /// A saved model, on `device`. `dynamics` is the content of its model file.
     ///
     /// # Errors
     /// Numbers or networks that do not make a model.
@@ -110,7 +110,7 @@ impl HybridModel {
         Self::assembled(&shape.system, shape.joints, equations, weights, device)
     }
 
-    /// A model with the networks of `weights`, and with `equations` where its prior is none of these.
+    /// A model with the networks of `weights`, and with `equations` if its prior is not a network.
     fn assembled(
         system: &str,
         joints: usize,
@@ -138,7 +138,7 @@ impl HybridModel {
         self.structure.joints
     }
 
-    /// The physical parameters as declared, with their current values; none where the prior is a network.
+    /// The physical parameters as declared, with their current values; none if the prior is a network.
     pub fn declared(&self) -> Vec<Parameter> {
         let equations = self.equations();
         equations.map_or_else(Vec::new, |dynamics| dynamics.parameters)
@@ -182,8 +182,8 @@ impl HybridModel {
         Self::assembled(system, joints, equations, weights, &device)
     }
 
-    /// The whole model, networks included, as one program with the current numbers: what integrators in
-    /// f64, planners and exporters read.
+    /// The whole model, networks included, as one program with the current numbers, as read by f64 integrators,
+    /// planners and exporters.
     ///
     /// # Errors
     /// None for a model made by this module's constructors.
@@ -195,8 +195,8 @@ impl HybridModel {
         Ok(whole?)
     }
 
-    /// The equations with the current values, or what stands in their place where the prior is a network; and the
-    /// networks whose outputs are added to their derivative.
+    /// The equations with the current values, or their stand-in if the prior is a network; and the networks whose
+    /// outputs are added to their derivative.
     pub fn parts(&self) -> (Dynamics, Vec<MlpWeights>) {
         let ModelWeights {
             prior, residual, ..
@@ -211,7 +211,7 @@ impl HybridModel {
         (around, prior.into_iter().chain(residual).collect())
     }
 
-    /// The model as planners take it; `integrator` is the one that it was trained through.
+    /// The model for planners; `integrator` is the one that it was trained through.
     pub fn predictor(&self, integrator: Integrator) -> Predictor {
         let (equations, networks) = self.parts();
         Predictor::new(equations, networks, integrator)
@@ -251,7 +251,7 @@ impl HybridModel {
         flattened(self.tensors_of_prior().chain(residual).collect())
     }
 
-    /// The same as a tensor of the prior and one of the residual.
+    /// All learnable numbers as one tensor for the prior and one for the residual.
     pub(crate) fn flat_parts(&self) -> (Tensor<1>, Option<Tensor<1>>) {
         let residual = self.residual.as_ref();
         let residual = residual.map(|residual| flattened(residual.tensors().collect()));
@@ -279,7 +279,7 @@ impl HybridModel {
         }
     }
 
-    /// The same model with the physical parameters brought back within their bounds, as after a step of an optimiser.
+    /// The same model with the physical parameters clamped to their bounds, as after an optimiser step.
     #[must_use]
     pub fn within_bounds(self) -> Self {
         Self {

@@ -9,11 +9,11 @@ use super::HybridError;
 use super::tensor::{to_f32, vector};
 use residyn_core::model::{Dynamics, Parameter};
 
-/// The physical parameters of declared equations, each divided by its scale, so that a step of an optimiser is relative to
-/// the parameter's own magnitude.
+/// The physical parameters of declared equations, each divided by its scale, so that an optimiser step is relative to
+/// the parameter's magnitude.
 ///
-/// They are one tensor: an optimiser takes a dozen operations for each tensor, however small it is. The entries of
-/// parameters that are declared fixed are never read.
+/// They form one tensor: an optimiser needs a dozen operations per tensor, however small. The entries of parameters
+/// that are declared fixed are never read.
 #[derive(Module, Debug)]
 pub struct Physics {
     /// value / scale of each parameter, `[parameters]`.
@@ -24,7 +24,7 @@ pub struct Physics {
 
 impl Physics {
     /// # Errors
-    /// A parameter that is not finite, outside of its bounds, or without a scale.
+    /// A parameter that is not finite, is outside its bounds, or has no scale.
     pub(super) fn new(
         dynamics: &Dynamics,
         id: ParamId,
@@ -44,8 +44,8 @@ impl Physics {
         self.declared.iter().map(|p| p.name.as_str())
     }
 
-    /// A parameter in its unit, of shape `[1]`, with its derivative: for a penalty of one's own. `None` where no parameter
-    /// has this name.
+    /// A parameter in its unit, of shape `[1]`, with its derivative: for a custom penalty. `None` if no parameter has
+    /// this name.
     pub fn parameter(&self, name: &str) -> Option<Tensor<1>> {
         let index = self.names().position(|known| known == name)?;
         Some(self.column(index, &self.scaled.val()))
@@ -66,8 +66,8 @@ impl Physics {
         scaled.clone().narrow(0, index, 1) * parameter.scale
     }
 
-    /// The value of every parameter in its unit; of fixed ones as declared, to the last bit. One that rests on a bound stays
-    /// within it, however it was rounded.
+    /// The value of every parameter in its unit; fixed parameters keep their declared value to the last bit. A
+    /// parameter on a bound stays within it, however it was rounded.
     pub(super) fn values(&self) -> Vec<f64> {
         let scaled = to_f32(self.scaled.val());
         let pairs = self.declared.iter().zip(scaled);
@@ -78,7 +78,7 @@ impl Physics {
         values.collect()
     }
 
-    /// The same with other values / scales.
+    /// The same parameters with other values / scales.
     pub(super) fn with_scaled(&self, scaled: Tensor<1>) -> Self {
         Self {
             scaled: Param::initialized(self.scaled.id, scaled),
@@ -86,7 +86,7 @@ impl Physics {
         }
     }
 
-    /// The same with every parameter brought back within its bounds.
+    /// The same with every parameter clamped to its bounds.
     #[must_use]
     pub(super) fn within_bounds(self) -> Self {
         Self {
@@ -96,8 +96,8 @@ impl Physics {
     }
 }
 
-/// value / scale of each parameter, brought back within the bounds (projected gradient descent: a parameter may rest on a
-/// bound and leave it again). What is not a number stays so.
+/// value / scale of each parameter, clamped to the bounds (projected gradient descent: a parameter may rest on a bound
+/// and leave it again). NaN stays NaN.
 #[allow(clippy::cast_possible_truncation)] // training runs in f32
 pub(crate) fn within_bounds(declared: &[Parameter], scaled: Param<Tensor<1>>) -> Param<Tensor<1>> {
     let is_bounded = |p: &Parameter| p.bounds.iter().any(|bound| bound.is_finite());

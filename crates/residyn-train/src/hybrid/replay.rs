@@ -10,7 +10,7 @@ enum Value {
 }
 
 /// Evaluates a program on Burn tensors, one row of the batch in each entry, with Burn's derivatives and on its devices.
-/// `inputs` are of shape `[batch]`, or `[1]` for what all rows share; so are the outputs.
+/// `inputs` have the shape `[batch]`, or `[1]` for values that all rows share; so do the outputs.
 ///
 /// # Panics
 /// When `inputs` is empty or not as long as [`Program::inputs`].

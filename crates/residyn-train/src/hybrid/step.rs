@@ -8,8 +8,8 @@ use residyn_core::sim::{Integrator, Scheme};
 pub struct StepResult {
     /// `2n` columns `[batch]`.
     pub state: Vec<Tensor<1>>,
-    /// F_r at the start of the step, `[batch, n or 2n]`: not at inner stages, so that its norm is comparable between
-    /// integrators.
+    /// F_r at the start of the step only, `[batch, n or 2n]`, not at inner stages, so that its norm is comparable
+    /// between integrators.
     pub residual: Option<Tensor<2>>,
 }
 

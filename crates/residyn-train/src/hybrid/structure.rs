@@ -10,7 +10,7 @@ pub(crate) struct Structure {
     pub joints: usize,
     /// The prior as declared, if it is equations.
     pub equations: Option<Dynamics>,
-    /// The networks whose outputs are added to the last of the rates: the prior, where it is one, and the residual.
+    /// The networks whose outputs are added to the last rates: the prior, if it is one, and the residual.
     pub networks: Vec<MlpWeights>,
     /// Whether the last network is a residual.
     pub has_residual: bool,
@@ -19,7 +19,7 @@ pub(crate) struct Structure {
     /// The reverse derivative of `program`. Inputs: those of `program`, with the derivatives of a quantity by each output
     /// before the parameters. Outputs: its derivatives by the `2n` states, then by each parameter that is not fixed.
     pub adjoint: Program,
-    /// `adjoint` by the parameters alone.
+    /// `adjoint` with respect to the parameters alone.
     pub parameter_adjoint: Program,
 }
 
@@ -35,7 +35,7 @@ impl Structure {
         Self::new(system.to_owned(), joints, None, vec![prior.clone()], false)
     }
 
-    /// The same with this residual in place of any other.
+    /// The same structure with this residual in place of any other.
     pub(super) fn with_residual(&self, residual: &MlpWeights) -> Self {
         let mut networks = self.networks.clone();
         networks.truncate(usize::from(self.equations.is_none()));
@@ -44,7 +44,7 @@ impl Structure {
         Self::new(system, self.joints, equations, networks, true)
     }
 
-    /// The physical parameters as declared; none where the prior is a network.
+    /// The physical parameters as declared; none if the prior is a network.
     pub(crate) fn parameters(&self) -> &[Parameter] {
         let equations = self.equations.as_ref();
         equations.map_or(&[], |dynamics| &dynamics.parameters)

@@ -42,7 +42,7 @@ impl<'a> Views<'a> {
     /// The next `count` entries.
     ///
     /// # Panics
-    /// Where fewer are left.
+    /// If fewer are left.
     pub(super) fn next(&mut self, count: usize) -> Tensor<1> {
         let view = self.of.clone().narrow(0, self.taken, count);
         self.taken += count;

@@ -7,7 +7,7 @@ use residyn_core::model::ResidualOn;
 /// ds/dt at a batch of points.
 #[derive(Debug, Clone)]
 pub struct Derivative {
-    /// dq/dt then dqd/dt: `2n` columns of shape `[batch]`, or `[1]` where all rows agree.
+    /// dq/dt then dqd/dt: `2n` columns of shape `[batch]`, or `[1]` if all rows agree.
     pub rates: Vec<Tensor<1>>,
     /// F_r, `[batch, n or 2n]`; none in a model without a residual.
     pub residual: Option<Tensor<2>>,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use residyn_core::plant::{Sampling, Starts};
 use residyn_core::sim::Integrator;
 
-/// What a model is trained on.
+/// The data that a model is trained on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Keys", untagged)]
 pub enum Data {
@@ -34,7 +34,7 @@ pub struct Simulated {
     pub steps: usize,
 }
 
-/// All keys of `[data]`, before they are divided into those of logs and those of a plant.
+/// All keys of `[data]`, before they are split into the keys for logs and for a plant.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Keys {
@@ -53,8 +53,8 @@ struct Keys {
 }
 
 impl Logged {
-    /// Settings for logs of desk-sized rigs: a step of 10 ms is short compared with the motion, and eight steps together
-    /// show what one step buries in encoder noise.
+    /// Settings for logs of desk-sized rigs: a step of 10 ms is short compared with the motion, and eight steps show
+    /// what encoder noise hides in one.
     pub fn usual(logs: Vec<PathBuf>) -> Self {
         Self {
             logs,

@@ -15,14 +15,14 @@ use residyn_io::files::read_text;
 const TUNING_EPOCHS: usize = 500;
 const TUNING_RATE: f64 = 0.003;
 
-/// What to train, starting where, on which data, and how.
+/// What to train, from which start, on which data, and how.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
     /// A model file, relative to the recipe, or the name of a built-in system.
     pub model: PathBuf,
     pub kind: Kind,
-    /// Physical parameters to hold at their values, besides those that the model file fixes.
+    /// Physical parameters to hold at their values, in addition to those that the model file fixes.
     #[serde(default)]
     pub hold: Vec<String>,
     /// Initial values that differ from those of the model file.
@@ -83,7 +83,7 @@ impl Recipe {
         Self::from_text(path, &text)
     }
 
-    /// Parses the recipe in `text`; the files that it names are relative to `path`.
+    /// Parses the recipe in `text`; file names in it are relative to `path`.
     ///
     /// # Errors
     /// As [`Recipe::read`].
@@ -96,7 +96,7 @@ impl Recipe {
         recipe.located(path)
     }
 
-    /// The recipe in `json`, with the keys of a file; the files that it names are relative to the working directory.
+    /// The recipe in `json`, with the keys of a recipe file; file names in it are relative to the working directory.
     ///
     /// # Errors
     /// As [`Recipe::read`], without lines.
@@ -110,15 +110,15 @@ impl Recipe {
         recipe.located(path)
     }
 
-    /// The same recipe as one of this file, once it is sound.
+    /// The recipe, located at this file and checked.
     fn located(mut self, path: &Path) -> Result<Self, RecipeError> {
         path.clone_into(&mut self.path);
         self.check().map_err(|message| self.wrong(message))?;
         Ok(self)
     }
 
-    /// The recipe for fine-tuning a model of `system` on logs: segments and integrator suit rigs that are sampled finely
-    /// and irregularly, and the learning rates are low enough to keep what the model has learnt.
+    /// The recipe for fine-tuning a model of `system` on logs: segments and integrator suit finely and irregularly
+    /// sampled rigs, and the learning rates are low enough to keep what the model has learnt.
     pub fn for_logs(system: &str, logs: Vec<PathBuf>) -> Self {
         Self {
             model: system.into(),
@@ -141,7 +141,7 @@ impl Recipe {
         }
     }
 
-    /// Refuses settings that would silently be ignored.
+    /// Refuses settings that would be silently ignored.
     fn check(&self) -> Result<(), String> {
         if self.kind == Kind::Physics && self.network.is_some() {
             return Err(

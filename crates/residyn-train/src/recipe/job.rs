@@ -14,7 +14,7 @@ pub struct Job {
     pub data: TrainingData,
     /// The model before training.
     pub model: HybridModel,
-    /// What the checkpoints record of the run.
+    /// The origin that the run's checkpoints record.
     pub origin: Origin,
     /// The equations of the model file, for resuming.
     pub(super) dynamics: Dynamics,
@@ -93,7 +93,7 @@ impl Job {
         Ok(checkpoint.training(&self.dynamics, &self.model.device())?)
     }
 
-    /// What decides the numbers of the training.
+    /// Everything that determines the training's numbers.
     pub fn identity(&self) -> Identity {
         let Origin {
             config,
@@ -110,7 +110,7 @@ fn identity(config: &Value, seed: u64, model_toml: &str) -> Identity {
     let mut config = config.clone();
     let mut take = |key: &str| config.as_object_mut().and_then(|all| all.remove(key));
     let text = |value: Option<Value>| value.as_ref().and_then(Value::as_str).map(str::to_owned);
-    // How the command was spelled does not matter.
+    // The spelling of the command does not matter.
     take(COMMAND_LINE);
     let (command, data) = (text(take("command")), text(take("data")));
     let inputs = [
@@ -134,7 +134,7 @@ pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<(Model, Str
     Ok((model, text.into_owned()))
 }
 
-/// The network of the recipe or, where it says nothing, of the model file.
+/// The network of the recipe or, if it gives none, of the model file.
 pub(super) fn new_network(
     recipe: &Recipe,
     model: &Model,

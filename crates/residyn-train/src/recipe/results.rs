@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{Job, Kind};
 use crate::{HybridModel, Objective, Segments, TrainError, Training};
 
-/// A prediction error that grew by this factor is no matter of rounding, or of a penalty.
+/// A prediction error that grew by this factor is not due to rounding or to a penalty.
 const WORSE: f64 = 2.0;
 
 /// The results of a training.
@@ -22,7 +22,7 @@ pub struct TrainingResults {
     pub loss: f64,
     /// Prediction error on the training segments: mean of ||s' - s_hat'||^2.
     pub error: Change,
-    /// The same on test segments of the plant; none with logs.
+    /// Prediction error on test segments of the plant; none with logs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub test_error: Option<Change>,
     /// ||F_r||; 0 for a model without a residual.
@@ -142,7 +142,7 @@ impl TrainingResults {
         out
     }
 
-    /// Whether the training made the prediction error several times as large: then there is nothing to use.
+    /// Whether training made the prediction error several times as large, so that the result is useless.
     pub fn is_worse(&self) -> bool {
         self.error.after > WORSE * self.error.before
     }

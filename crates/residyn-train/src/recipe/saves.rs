@@ -3,7 +3,8 @@ use std::time::{Duration, Instant};
 
 use crate::Progress;
 
-/// When a run is saved: after so many epochs, at its end, and before an interruption would lose more than ten seconds of work.
+/// When a run is saved: every set number of epochs, at its end, and before an interruption would lose more than ten
+/// seconds of work.
 #[derive(Debug)]
 pub struct Saves {
     every: NonZeroUsize,
@@ -14,16 +15,16 @@ pub struct Saves {
 const LONGEST_UNSAVED: Duration = Duration::from_secs(10);
 
 impl Saves {
-    /// The epochs between two checkpoints, unless told otherwise.
+    /// The default number of epochs between two checkpoints.
     pub const EVERY: NonZeroUsize = NonZeroUsize::new(500).expect("not zero");
 
-    /// For a run that begins or goes on now.
+    /// For a run that begins or continues now.
     pub fn new(every: NonZeroUsize) -> Self {
         let last = Instant::now();
         Self { every, last }
     }
 
-    /// Whether the run is to be saved now; if so, the caller does.
+    /// Whether the run is due for saving; if so, the caller saves it.
     pub fn are_due(&mut self, at: &Progress<'_>) -> bool {
         let due = at.epoch.is_multiple_of(self.every.get())
             || at.epoch == at.epochs

@@ -7,20 +7,20 @@ use crate::{FitSettings, HybridModel, Penalty, TrainError, Trained, Training};
 use residyn_core::model::MlpWeights;
 use residyn_core::streams::{Purpose, stream};
 
-/// What sets one model of a sweep apart from the others.
+/// What distinguishes one model of a sweep from the others.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Member {
     /// Seed of its initial weights and of the order of its minibatches.
     pub seed: u64,
-    /// Weight of the penalty; the recipe's own where there is none.
+    /// Weight of the penalty; the recipe's if `None`.
     pub alpha: Option<f64>,
 }
 
 impl Job {
-    /// That a sweep can train these models.
+    /// Check that a sweep can train these models.
     ///
     /// # Errors
-    /// A model without a network, whose copies would all be equal; weights for a penalty that does not take them.
+    /// A model without a network, whose copies would all be equal; alpha for a penalty that does not take it.
     pub fn check_members(&self, members: &[Member]) -> Result<(), RecipeError> {
         let Self { recipe, .. } = self;
         let with_alpha = members.iter().any(|member| member.alpha.is_some());
@@ -45,11 +45,11 @@ impl Job {
         }
     }
 
-    /// Trains one model of a sweep on the data of this job, from the weights that a job of the model's own seed would draw.
-    /// `after_epoch` is called after each epoch.
+    /// Trains one model of a sweep on the data of this job, from the weights that a job with the model's seed would
+    /// draw. `after_epoch` is called after each epoch.
     ///
     /// # Errors
-    /// Settings that are out of range. A model that diverges is no error.
+    /// Settings that are out of range. A model that diverges is not an error.
     pub fn train_member(
         &self,
         member: &Member,
@@ -75,7 +75,7 @@ impl Job {
         }
     }
 
-    /// The job's model with the network that a job of another seed would draw.
+    /// The job's model with the network that a job with another seed would draw.
     fn redrawn(&self, seed: u64) -> Result<HybridModel, TrainError> {
         let Recipe { kind, .. } = &self.recipe;
         let mut weights = self.model.weights();

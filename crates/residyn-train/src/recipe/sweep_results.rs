@@ -36,7 +36,7 @@ pub struct Totals {
     pub diverged: usize,
     /// Epochs of each model.
     pub epochs: usize,
-    /// Time that the training of all models took, one after the other or as batches, s.
+    /// Time to train all models, one after another or in batches, s.
     pub wall_s: f64,
     pub models_per_s: f64,
 }

@@ -14,7 +14,7 @@ use residyn_io::read_plant;
 /// The data of a recipe, read or sampled.
 pub struct TrainingData {
     pub training: Segments,
-    /// The same number of other segments of the plant, for testing; none with logs.
+    /// As many other segments of the plant, for testing; none with logs.
     pub test: Option<Segments>,
     /// Names and true values of the parameters of a simulated plant.
     pub truth: Vec<(String, f64)>,
@@ -57,7 +57,7 @@ fn from_logs(recipe: &Recipe, logged: &Logged, model: &Model) -> Result<Training
     for log in &logs {
         let before = training.len();
         for trajectory in trajectories(&modelled(log), thinning) {
-            // A piece between gaps may be too short for a segment; a log without any segment is refused below.
+            // A trajectory between gaps may be too short for a segment; a log without any segment is refused below.
             if trajectory.time.len() > logged.steps {
                 push(&mut training, &trajectory).map_err(in_file(&log.path))?;
             }

@@ -10,8 +10,8 @@ use residyn_core::model::{LastLayer, Library, Model, Origin};
 impl Job {
     /// Fine-tunes the model of a checkpoint on the recipe's data.
     ///
-    /// All parameters of the checkpoint's model are trained further, at the recipe's rates. With `kind = "hybrid"`, a model
-    /// without a residual is given one that is initially zero, so that the checkpoint takes the place of F_p; an existing
+    /// All parameters of the checkpoint's model are trained further, at the recipe's rates. With `kind = "hybrid"`, a
+    /// model without a residual gets one that is initially zero, so that the checkpoint serves as F_p; an existing
     /// residual is trained further. The other kinds add nothing and must match the checkpoint.
     ///
     /// # Errors
@@ -30,7 +30,7 @@ impl Job {
                     .into(),
             ));
         }
-        // Only to refuse a checkpoint of another system: the equations are those saved with the weights.
+        // Used only to refuse a checkpoint of another system: the equations are the ones saved with the weights.
         let meant = declared(&recipe, library)?.0.dynamics();
         let refused = |source| RecipeError::OtherModel {
             path: recipe.path.clone(),

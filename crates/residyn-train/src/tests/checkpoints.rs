@@ -23,7 +23,7 @@ fn trained(c_g: f64) -> Training {
     fit(model, &segments, settings)
 }
 
-/// A saved checkpoint, in a directory that lives as long as the first part.
+/// A saved checkpoint, in a directory that exists as long as the first part.
 fn saved() -> (tempfile::TempDir, PathBuf) {
     let parent = tempfile::tempdir().unwrap();
     let dir = parent.path().join("run");

@@ -31,7 +31,7 @@ pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {
     segments
 }
 
-/// The library's equations, one of their parameters held.
+/// The library's equations, with one parameter held.
 pub(super) fn equations(joints: usize) -> Dynamics {
     let name = ["pendulum", "acrobot"][joints - 1];
     let mut dynamics = Library::built_in().model(name).unwrap().dynamics();
@@ -48,7 +48,7 @@ pub(super) fn network(joints: usize, angles: Angles, on: ResidualOn, seed: u64) 
     segments(joints, 50, 1).network(&settings, LastLayer::Random, &mut rng(seed))
 }
 
-/// Every kind of model of so many joints.
+/// Every kind of model with this many joints.
 fn models(joints: usize, device: &Device) -> Vec<HybridModel> {
     let physics = HybridModel::physics(&equations(joints), device).unwrap();
     let mut models = vec![physics.clone()];
@@ -65,7 +65,7 @@ fn models(joints: usize, device: &Device) -> Vec<HybridModel> {
     models
 }
 
-/// The loss and its gradient with weights of a training.
+/// The loss and its gradient with the weights of a training run.
 fn weighted(model: &HybridModel, batch: &Batch, objective: &Objective) -> Gradient {
     let of_norm = if model.residual.is_some() { 1.3 } else { 0.0 };
     gradient(objective, model, batch, [0.7, of_norm])
@@ -91,7 +91,7 @@ fn assert_agrees(model: &HybridModel, segments: &Segments, integrator: Integrato
     }
     let (found, wanted) = (found.by_numbers, wanted.by_numbers);
     assert_eq!(found.len(), wanted.len());
-    // The physical parameters and the networks, whose slopes differ in size.
+    // The physical parameters and the networks separately, as their slopes differ in size.
     let parameters = model.declared().len();
     for part in [0..parameters, parameters..wanted.len()] {
         let (found, wanted) = (&found[part.clone()], &wanted[part]);

@@ -106,7 +106,7 @@ pub(super) fn hybrid(
     hybrid_of(&pendulum(c_g, c_i), &residual, &backend.device())
 }
 
-/// These equations and this residual.
+/// A model of these equations and this residual.
 pub(super) fn hybrid_of(
     dynamics: &Dynamics,
     residual: &MlpWeights,
@@ -134,7 +134,7 @@ pub(super) fn run(training: &mut Training, segments: &Segments) {
 pub(super) struct Gradient {
     /// E and ||F_r||.
     pub loss: [f64; 2],
-    /// Of their weighted sum, by the numbers of the physical parameters and of each network, in Burn's order.
+    /// The gradient of their weighted sum by the physical parameters and each network's numbers, in Burn's order.
     pub by_numbers: Vec<f32>,
 }
 

@@ -73,7 +73,7 @@ fn what_has_no_decoupled_decay_says_so() {
     }
 }
 
-/// How far the one parameter of a model has gone after each epoch of gradient descent with sign (Lion, first step).
+/// How far a model's single parameter has moved after each epoch of sign gradient descent (Lion, first step).
 fn rates(schedule: Schedule) -> Vec<f64> {
     let segments = transitions(20, 0.0, 1);
     let dynamics = one_joint("C_g * sin(q1) + 3 * tau1", vec![parameter("C_g", 8.0)]);

@@ -115,7 +115,7 @@ fn tensors_lanes_and_the_exported_program_agree() {
 #[test]
 fn tensors_and_the_exported_program_of_two_joints_agree() {
     let acrobot = Library::built_in().model("acrobot").unwrap();
-    let acrobot = acrobot.with_sign_widths(vec![0.0; 2]).dynamics();
+    let acrobot = acrobot.with_smoothing_velocities(vec![0.0; 2]).dynamics();
     let mut rng = rng(12);
     // Positions, velocities, inputs and time of each row.
     let rows = [(); ROWS].map(|()| [(); 7].map(|()| rng.random_range(-3.0f32..3.0)));

@@ -35,7 +35,7 @@ fn training(backend: Backend) -> Training {
     Training::new(model, settings, rng(3)).unwrap()
 }
 
-/// Run on until `epoch`, saving there if a directory is given.
+/// Continue until `epoch`, saving there if a directory is given.
 fn run(training: &mut Training, epoch: usize, dir: Option<&Path>) -> Ended {
     let (segments, validation) = (transitions(100, -0.5, 1), transitions(30, -0.5, 2));
     let mut observer = |progress: &crate::Progress| {

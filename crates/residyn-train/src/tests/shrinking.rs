@@ -93,7 +93,7 @@ fn learning_rates_fall_from_one_to_the_annealed_share() {
         anneal: 1e-9,
         ..settings(2)
     };
-    // The first step is taken at the whole rate, the last at a billionth.
+    // The first step is taken at the full rate, the last at a billionth.
     let (two, one) = (after(&model, falling), after(&model, settings(1)));
     let off = residual(&two)
         .into_iter()

@@ -35,7 +35,7 @@ fn random_numbers_follow_the_standard_normal_distribution() {
         .fold(0.0, f64::max);
     // Kolmogorov and Smirnov's statistic at one in a thousand.
     assert!(distance < 1.95 / count.sqrt(), "{distance}");
-    // Neighbours, in lanes and in rows, have nothing to do with each other.
+    // Neighbours, in lanes and in rows, are uncorrelated.
     let product = rows
         .windows(2)
         .flat_map(|pair| (0..W).map(move |l| pair[0][l] * pair[1][l]));

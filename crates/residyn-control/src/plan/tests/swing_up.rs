@@ -21,7 +21,7 @@ fn swing_up(method: Method) -> Settings {
     }
 }
 
-/// The published task, from hanging to upright: 500 steps, of each plan the first 50.
+/// The published task, from hanging to upright: 500 steps, the first 50 of each plan.
 fn swung_up(method: Method, seed: u64) -> f64 {
     let equations = pendulum(&[]);
     let objective = Objective::new("cos(q1)", 1).unwrap();
@@ -60,7 +60,7 @@ fn a_pendulum_is_swung_up_and_held() {
     assert!(icem[0] > 380.0, "{icem:?}");
 }
 
-/// The same task on a rig whose torque acts 60 ms late, for a planner that knows `model` of it.
+/// The same task on a rig whose torque acts 60 ms late, for a planner that plans with `model`.
 fn swung_up_late(rig: &Dynamics, model: &Dynamics) -> f64 {
     let objective = Objective::new("cos(q1)", 1).unwrap();
     let rollouts = Rollouts::new(model, &[], objective.program(), Integrator::RK4, 0.02);

@@ -8,18 +8,18 @@ use crate::closeloop::settings::Settings;
 use crate::identify::{Fit, FitError, as_it_stands, fit, squared_distance, uncertainty};
 use crate::model::FittedEffect;
 
-/// The smallest size of an effect, and what the search named where that was hidden in simulated logs.
+/// The smallest size of an effect, and what the search named when the effect was hidden in simulated logs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DetectionLimit {
     /// The effect, absent.
     pub effect: FittedEffect,
     pub smallest: Smallest,
-    /// What was named with the effect at a multiple of that size; `None` where it was not tried.
+    /// What was named with the effect at a multiple of that size; `None` if it was not tried.
     pub named: Option<Vec<Named>>,
 }
 
 impl DetectionLimit {
-    /// Whether the hidden effect was named; `None` where it was not tried.
+    /// Whether the hidden effect was named; `None` if it was not tried.
     pub fn verified(&self) -> Option<bool> {
         let this = Named::of(&self.effect);
         self.named.as_ref().map(|named| named.contains(&this))
@@ -29,8 +29,8 @@ impl DetectionLimit {
 /// The smallest size of one effect that the search would name.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Smallest {
-    /// One switch alone, the one that shows at the smallest multiple of its typical value; the values of all
-    /// parameters, inner ones at the searched values that show the effect best, other switches at zero.
+    /// One switch alone, the one that shows at the smallest multiple of its typical value; with the values of all
+    /// parameters, inner ones at the tried values that show the effect best, other switches at zero.
     Detectable { switch: usize, values: Vec<f64> },
     /// None: the motion does not distinguish it from what the model has.
     Indistinguishable,
@@ -70,8 +70,8 @@ pub(super) fn detection_limits(
 struct Baseline<'a> {
     problem: &'a Problem<'a>,
     accepted: &'a Fitted,
-    locals: Vec<Vec<f64>>,
-    /// The loss on stretches left out of the fit.
+    start_states: Vec<Vec<f64>>,
+    /// The loss on blocks left out of the fit.
     loss: f64,
 }
 
@@ -79,16 +79,22 @@ impl<'a> Baseline<'a> {
     fn new(problem: &'a Problem<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
         let dynamics = accepted.model.dynamics();
         let scale = accepted.fit.scale;
-        let states = problem.shooting.initial_locals(0);
+        let states = problem.shooting.initial_start_states(0);
         let (_, free) = fit(&problem.shooting, &dynamics, &[], states, Some(scale))?;
-        let locals = free.locals;
+        let start_states = free.start_states;
         let active = &accepted.fit.active;
-        let fit = as_it_stands(&problem.shooting, &dynamics, active, locals.clone(), scale)?;
+        let fit = as_it_stands(
+            &problem.shooting,
+            &dynamics,
+            active,
+            start_states.clone(),
+            scale,
+        )?;
         let loss = left_out_losses(problem, &fit).iter().sum();
         Ok(Self {
             problem,
             accepted,
-            locals,
+            start_states,
             loss,
         })
     }
@@ -101,7 +107,7 @@ impl<'a> Baseline<'a> {
         if switches.is_empty() {
             return Smallest::NotComputed;
         }
-        // Of a value that each log has of its own, the same in all: there are as many to be tested.
+        // A per-log value is taken to be the same in all logs, but one value per log is tested.
         let tested = if parameters.iter().any(|p| p.per_log) {
             switches.len() * self.problem.logs.len()
         } else {
@@ -149,7 +155,7 @@ impl<'a> Baseline<'a> {
         Ok(self.smallest_by(&fit, switches, level))
     }
 
-    /// The smallest size of the last free value of a fit; `None` where the motion does not tell it from the others.
+    /// The smallest size of the last free value of a fit; `None` if the motion does not distinguish it from the others.
     fn smallest_by(&self, fit: &Fit, switches: usize, level: f64) -> Option<f64> {
         let Settings {
             establish: settings,
@@ -179,13 +185,13 @@ impl<'a> Baseline<'a> {
             &self.problem.shooting,
             &dynamics,
             &[accepted.fit.active.as_slice(), &[switch]].concat(),
-            self.locals.clone(),
+            self.start_states.clone(),
             accepted.fit.scale,
         )
     }
 }
 
-/// Information on the last free value, the others free as well; `None` where it is no more than rounding.
+/// Information on the last free value, the others free as well; `None` if it is no more than rounding error.
 fn own_information(fit: &Fit, least: f64) -> Option<f64> {
     let last = fit.columns.len() - 1;
     let all = fit.equations().hessian;
@@ -195,7 +201,7 @@ fn own_information(fit: &Fit, least: f64) -> Option<f64> {
     (own > least && all[(last, last)] > 0.0).then(|| own * all[(last, last)])
 }
 
-/// Standard deviations from zero at which one of so many switches are significant at level `p`: the threshold of
+/// Standard deviations from zero at which one of `switches` switches is significant at level `p`: the threshold of
 /// Hotelling's test. `None` for too few blocks.
 #[allow(clippy::cast_precision_loss)] // few blocks
 fn critical(p: f64, switches: usize, blocks: usize) -> Option<f64> {

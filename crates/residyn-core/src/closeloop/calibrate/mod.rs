@@ -14,27 +14,28 @@ use serde::{Deserialize, Serialize};
 use self::detection_limit::detection_limits;
 use self::simulated_logs::SimulatedLogs;
 use super::error::StudyError;
+use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::pipeline::find;
 use super::problem::Problem;
-use super::space::Space;
 use super::stage::{Stage, Watch};
 use crate::data::Joint;
 use crate::data::statistics::wilson;
 use crate::model::{FittedEffect, Model, Status};
 use crate::streams::{Purpose, stream};
 
-/// The results of the search on logs simulated from the accepted model, with the torques and the noise of the user's.
+/// The results of the search on logs simulated from the accepted model, with the torques and the noise of the user's
+/// logs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// What was named in each simulation of the accepted model: every one a false alarm.
     pub named: Vec<Vec<Named>>,
-    /// Number of them with a significant unexplained remainder.
+    /// Number of these simulations with a significant unexplained residual.
     pub unexplained: usize,
     pub limits: Vec<DetectionLimit>,
     /// Effects were hidden at this multiple of their smallest size.
     pub hidden: f64,
-    /// Of each joint in the training logs.
+    /// The largest torque of each joint in the training logs.
     pub top_torque: Vec<f64>,
 }
 
@@ -52,7 +53,7 @@ impl Calibration {
         self.named.iter().filter(|named| !named.is_empty()).count()
     }
 
-    /// Their share.
+    /// Share of simulations in which something was named.
     #[allow(clippy::cast_precision_loss)] // few runs
     pub fn rate(&self) -> f64 {
         self.alarms() as f64 / self.named.len().max(1) as f64
@@ -64,7 +65,7 @@ impl Calibration {
     }
 }
 
-/// The effect to hide, if it is one of those that are.
+/// The effect to hide, if it is one of the common ones.
 fn hidden(limit: &DetectionLimit, multiple: f64) -> Option<FittedEffect> {
     let Smallest::Detectable { switch, values } = &limit.smallest else {
         return None;
@@ -94,23 +95,23 @@ impl Named {
     }
 }
 
-/// One set of simulated logs to be searched. What is drawn for it depends on the calibration's seed and its number alone, so
+/// One set of simulated logs to be searched. Its random draws depend only on the calibration's seed and its number, so
 /// that simulations may be searched in any order, and in several sessions.
 #[derive(Debug, Clone)]
 pub struct Simulation {
     number: usize,
     seed: u64,
-    /// What is hidden in it; nothing in a simulation of the accepted model itself.
+    /// The effect hidden in it; `None` in a simulation of the accepted model itself.
     hidden: Option<FittedEffect>,
 }
 
 impl Simulation {
-    /// Tells it from the others of all calibrations of one model on one set of logs.
+    /// Distinguishes it from all other simulations, in any calibration of one model on one set of logs.
     pub fn key(&self) -> String {
         format!("{:016x} {}: {}", self.seed, self.number, self.about())
     }
 
-    /// For people.
+    /// A description for people.
     pub fn about(&self) -> String {
         match &self.hidden {
             None => format!("simulation {} of the accepted model", self.number + 1),
@@ -119,15 +120,15 @@ impl Simulation {
     }
 }
 
-/// What the search said of a simulation.
+/// The result of the search on a simulation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Searched {
     pub named: Vec<Named>,
-    /// Whether a significant remainder was left.
+    /// Whether a significant residual was left unexplained.
     pub unexplained: bool,
 }
 
-/// Simulations of a model that [`find`] accepted, each to be searched as the user's own logs, and what is concluded.
+/// Simulations of a model that [`find`] accepted, each to be searched like the user's logs, and the conclusions.
 pub struct Calibrator<'a> {
     problem: &'a Problem<'a>,
     /// Whatever is named beyond the accepted model is a false alarm.
@@ -141,14 +142,14 @@ impl<'a> Calibrator<'a> {
     /// Plan `runs` simulations of the accepted model, and one for each common effect that is hidden.
     ///
     /// # Errors
-    /// A problem of torques; and as [`Problem::fit_declared`].
+    /// A problem that compares torques; and as [`Problem::fit_declared`].
     pub fn new(
         problem: &'a Problem<'a>,
         accepted: &'a Fitted,
         runs: usize,
         rng: &mut impl Rng,
     ) -> Result<Self, StudyError> {
-        if problem.space == Space::Torque {
+        if problem.error_model == ErrorModel::InverseDynamics {
             return Err(StudyError::NotOfMotion);
         }
         let limits = detection_limits(problem, accepted)?;
@@ -176,7 +177,7 @@ impl<'a> Calibrator<'a> {
         &self.simulations
     }
 
-    /// Simulate, and search what comes out; nothing where the motion diverges with the hidden effect.
+    /// Simulate, and search the result; `None` if the motion diverges with the hidden effect.
     ///
     /// # Errors
     /// As [`Problem::fit_declared`].

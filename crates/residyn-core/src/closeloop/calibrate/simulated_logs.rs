@@ -8,17 +8,17 @@ use crate::model::FittedEffect;
 
 /// The training logs as they would be if an accepted model were the truth.
 ///
-/// A rig that balances upright cannot be simulated open loop over a whole log. Each window is simulated
-/// from its fitted start state instead, under the logged torques, and the windows are set apart in time:
-/// cutting such logs into windows finds the same windows again, and no motion jumps within one.
+/// A rig that balances upright cannot be simulated open loop over a whole log. Each window is simulated from its fitted
+/// start state instead, under the logged torques, and the windows are separated in time: cutting such logs into windows
+/// finds the same windows again, and no motion jumps within one.
 pub(super) struct SimulatedLogs<'a> {
     problem: &'a Problem<'a>,
     accepted: &'a Fitted,
     /// The windows of each training log, a pause before each.
     apart: Vec<Log>,
     windows: Vec<Window>,
-    locals: Vec<Vec<f64>>,
-    /// Model less log in units of the noise: `[window][row * joints + joint]`.
+    start_states: Vec<Vec<f64>>,
+    /// Model minus log in units of the noise: `[window][row * joints + joint]`.
     residuals: Vec<Vec<f64>>,
     /// The block that each window belongs to.
     members: Vec<usize>,
@@ -32,29 +32,31 @@ impl<'a> SimulatedLogs<'a> {
         let rig = problem.on(&apart);
         let dynamics = accepted.model.dynamics();
         let values = Values::of(&dynamics, &apart);
-        let states = rig.shooting.initial_locals(0);
+        let states = rig.shooting.initial_start_states(0);
         let scale = Some(accepted.fit.scale);
         let (_, fit) = fit(&rig.shooting, &dynamics, &[], states, scale)?;
-        let locals = fit.locals;
+        let start_states = fit.start_states;
         Ok(Self {
             problem,
             accepted,
             windows: rig.shooting.windows.clone(),
-            residuals: rig.shooting.residuals(&dynamics, &values, &locals),
+            residuals: rig.shooting.residuals(&dynamics, &values, &start_states),
             members: blocks(&rig.shooting),
-            locals,
+            start_states,
             apart,
         })
     }
 
-    /// Logs of the accepted model with `more` effects. The noise is the residuals of the accepted model, the
-    /// sign of each block drawn at random (the wild cluster bootstrap of Cameron, Gelbach and Miller
-    /// 2008): colour, rounding and size stay, whatever is systematic goes. `None` where the motion diverges.
+    /// Logs of the accepted model with `more` effects. The noise is the residuals of the accepted model, with the sign
+    /// of each block drawn at random (the wild cluster bootstrap of Cameron, Gelbach and Miller 2008): colour, rounding
+    /// and size stay, anything systematic vanishes. `None` if the motion diverges.
     pub fn draw(&self, more: &[FittedEffect], rng: &mut impl Rng) -> Option<Vec<Log>> {
         let dynamics = self.problem.extended(self.accepted, more);
         let values = Values::of(&dynamics, &self.apart);
         let rig = self.problem.on(&self.apart);
-        let motion = rig.shooting.residuals(&dynamics, &values, &self.locals);
+        let motion = rig
+            .shooting
+            .residuals(&dynamics, &values, &self.start_states);
         if motion.iter().flatten().any(|x| !x.is_finite()) {
             return None;
         }
@@ -78,12 +80,12 @@ impl<'a> SimulatedLogs<'a> {
     }
 }
 
-/// The rows of the windows alone. Before each stands one row at the edge of what the estimate of its start state
-/// reads, and before that a pause that no estimate and no window spans.
+/// Only the rows of the windows. Each window is preceded by one row at the edge of the range that the estimate of its
+/// start state reads, and before that by a pause that no estimate or window spans.
 fn apart(problem: &Problem<'_>) -> Vec<Log> {
     let pause = problem.settings.calibrate.pause_half_widths;
     let windows = &problem.shooting.windows;
-    let stretch = |index: usize, log: &Log| {
+    let block = |index: usize, log: &Log| {
         let reach = half_width_s(log.median_step());
         let mut out = Log {
             time: Vec::new(),
@@ -113,6 +115,6 @@ fn apart(problem: &Problem<'_>) -> Vec<Log> {
         out
     };
     (problem.logs.iter().enumerate())
-        .map(|(index, log)| stretch(index, log))
+        .map(|(index, log)| block(index, log))
         .collect()
 }

@@ -37,7 +37,7 @@ fn coulomb(level: f64) -> String {
     format!("[[effect]]\nname = \"coulomb_friction\"\njoint = 1\nF_c = {level}\n")
 }
 
-/// Logs of the rig, with what is added to its file.
+/// Logs of the rig, with `more` added to its file.
 fn logs(more: &str, seed: u64) -> Vec<Log> {
     recorded(&format!("{RIG}\n{more}"), seed)
 }
@@ -60,15 +60,15 @@ fn simulated_logs_have_the_windows_of_the_original_logs() {
     assert_eq!(before.windows.len(), after.windows.len());
     // The motion is the accepted model's, and each residual has its old size: only signs were drawn.
     let residuals = |problem: &Problem<'_>| {
-        // What the rows of a neighbouring window tell of a start has that window's sign.
+        // What the rows of a neighbouring window say about a start state has that window's sign.
         let windows = problem.shooting.windows.clone();
         let shooting = problem.shooting.over(windows).with_free_starts();
-        let states = shooting.initial_locals(0);
+        let states = shooting.initial_start_states(0);
         let scale = Some(accepted.fit.scale);
         let dynamics = &accepted.model.dynamics();
         let (values, found) =
             crate::identify::fit(&shooting, dynamics, &[], states, scale).unwrap();
-        shooting.residuals(dynamics, &values, &found.locals)
+        shooting.residuals(dynamics, &values, &found.start_states)
     };
     let mut turned = 0;
     for (window, (old, new)) in residuals(&problem)
@@ -107,14 +107,14 @@ fn complete_models_raise_no_false_alarm_and_hidden_effects_are_named() {
         calibrator.conclude(searched)
     };
     let found = repeat(8);
-    // At the nominal 5 % two of eight have a chance of 6 %, three one of 0.6 %.
+    // At the nominal 5 %, two alarms in eight have a probability of 6 %, three one of 0.6 %.
     assert!(found.alarms() <= 2, "{:?}", found.named);
     let tried: Vec<_> = found
         .limits
         .iter()
         .filter_map(DetectionLimit::verified)
         .collect();
-    // The gain of the drive is one with the pendulum's own constants.
+    // The drive's gain cannot be distinguished from the pendulum's constants.
     assert_eq!(tried, [true; 3]);
     let gain = |limit: &&DetectionLimit| limit.effect.effect.name == "actuator_gain";
     let gain = found.limits.iter().find(gain).unwrap();

@@ -1,21 +1,21 @@
 use thiserror::Error;
 
 use super::separation::{Separation, separation};
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::judge::Found;
 use crate::closeloop::select::Rival;
-use crate::closeloop::space::Space;
 use crate::closeloop::stage::{Progress, Stage, Watch};
 use crate::model::FittedEffect;
 
-/// Another explanation that the logs do not distinguish from the one reported.
+/// Another explanation that the logs do not distinguish from the reported one.
 #[derive(Debug, Clone)]
 pub struct Alternative {
-    /// The whole set of effects.
+    /// The complete set of effects.
     pub effects: Vec<FittedEffect>,
-    /// The one of them that the set reported does not have.
+    /// The effect that the reported set does not have.
     pub effect: FittedEffect,
     pub reason: String,
-    /// The experiment that would tell it from the one reported, or why none was simulated.
+    /// The experiment that would distinguish it from the reported explanation, or why none was simulated.
     pub separation: Result<Separation, NotSimulated>,
 }
 
@@ -32,8 +32,8 @@ pub enum NotSimulated {
     Torques,
 }
 
-/// The sets of effects that explain the logs as well as the confirmed one, the best first; sets that replace a
-/// withdrawn effect are left out. For the best of them the experiment that tells the two apart is simulated.
+/// The sets of effects that explain the logs as well as the confirmed set, best first; sets that replace a withdrawn
+/// effect are left out. For the best sets, the experiment that distinguishes the two explanations is simulated.
 pub fn discriminate(found: &Found<'_>, watch: &dyn Watch) -> Vec<Alternative> {
     let (problem, fitted) = (&found.problem, &found.chosen.after);
     let stands = |effect: &FittedEffect| {
@@ -45,7 +45,7 @@ pub fn discriminate(found: &Found<'_>, watch: &dyn Watch) -> Vec<Alternative> {
         .collect();
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let alternative = |(rank, rival): (usize, &Rival)| {
-        if problem.space == Space::Torque {
+        if problem.error_model == ErrorModel::InverseDynamics {
             return Alternative::of(rival, Err(NotSimulated::Torques));
         }
         if rank >= problem.settings.discriminate.alternatives {

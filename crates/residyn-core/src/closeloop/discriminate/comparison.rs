@@ -14,7 +14,7 @@ use crate::model::{Dynamics, FittedEffect, Model};
 /// One of two explanations.
 pub(super) struct Hypothesis {
     dynamics: Dynamics,
-    /// Of the residuals in refits.
+    /// Scale of the residuals in refits.
     scale: f64,
 }
 
@@ -26,7 +26,7 @@ impl Hypothesis {
         }
     }
 
-    /// The rival without effects that were withdrawn from the model since.
+    /// The rival without effects that have since been withdrawn from the model.
     pub fn of_rival(problem: &Problem<'_>, fitted: &Fitted, rival: &Rival) -> Self {
         let stands = |effect: &&FittedEffect| {
             let mut known = fitted.model.effects.iter().chain([&rival.effect]);
@@ -50,7 +50,7 @@ impl Hypothesis {
         }
     }
 
-    /// The motion that it predicts; `None` where it diverges.
+    /// The motion that the hypothesis predicts; `None` if it diverges.
     fn simulate(&self, problem: &Problem<'_>, motions: &[Motion]) -> Option<Record> {
         let Settings {
             fit, discriminate, ..
@@ -59,32 +59,39 @@ impl Hypothesis {
         Record::of(motions, problem.logs, &self.dynamics, lengths_s)
     }
 
-    /// Fit to a record, every parameter free that the file does not fix: an experiment may determine what the
-    /// present logs do not.
-    fn refit(&self, shooting: &Shooting<'_>, locals: Vec<Vec<f64>>) -> Option<(Values, Fit)> {
+    /// Fit to a record, with every parameter free that the file does not fix: an experiment may determine parameters
+    /// that the present logs do not.
+    fn refit(&self, shooting: &Shooting<'_>, start_states: Vec<Vec<f64>>) -> Option<(Values, Fit)> {
         let parameters = &self.dynamics.parameters;
         let active: Vec<usize> = (0..parameters.len())
             .filter(|&k| !parameters[k].fixed)
             .collect();
-        fit(shooting, &self.dynamics, &active, locals, Some(self.scale)).ok()
+        fit(
+            shooting,
+            &self.dynamics,
+            &active,
+            start_states,
+            Some(self.scale),
+        )
+        .ok()
     }
 }
 
-/// Two explanations, of which one is simulated as the truth and the other is fitted to it.
+/// Two explanations: one is simulated as the truth, and the other is fitted to it.
 pub(super) struct Comparison<'a> {
     problem: &'a Problem<'a>,
     truth: Hypothesis,
-    /// Fitted to the present logs as the truth has them.
+    /// The other explanation, fitted to the present logs as the truth simulates them.
     other: Hypothesis,
     noise: Vec<f64>,
-    /// The motion of the present logs as the truth has it.
+    /// The motion of the present logs as the truth simulates it.
     present: Record,
-    /// Start states that the other takes there.
-    locals: Vec<Vec<f64>>,
-    /// Twice the loss that is left there, and the difference on each joint.
+    /// The other explanation's start states in the present logs.
+    start_states: Vec<Vec<f64>>,
+    /// Twice the loss that the other leaves in the present logs; then the difference on each joint.
     loss: f64,
     differences: Vec<f64>,
-    /// How many times more data it takes than independent normal residuals would.
+    /// How many times more data are needed than with independent normal residuals.
     inflation: f64,
 }
 
@@ -92,19 +99,20 @@ pub(super) struct Comparison<'a> {
 pub(super) struct Trial {
     /// What to do.
     pub text: String,
-    /// The joint on which the difference is largest beside the noise.
+    /// The joint on which the difference is largest relative to the noise.
     pub joint: Joint,
-    /// Root mean squares on that joint after refitting, in rad (or m): in the experiment, and in the present logs.
+    /// Root mean square difference on that joint after refitting, in rad (or m): in the experiment, and in the present
+    /// logs.
     pub difference: f64,
     pub present: f64,
-    /// Standard deviation in rad (or m).
+    /// Standard deviation of the noise, in rad (or m).
     pub noise: f64,
-    /// Length of logs that suffices; infinite where none does.
+    /// Length of logs that suffices, in s; infinite if none does.
     pub seconds: f64,
 }
 
 impl<'a> Comparison<'a> {
-    /// `model` is fitted to the problem's logs: its start states are theirs. `None` where the truth cannot follow them.
+    /// `fitted` is fitted to the problem's logs and has their start states. `None` if the truth cannot follow the logs.
     pub fn new(
         problem: &'a Problem<'a>,
         fitted: &Fitted,
@@ -127,16 +135,16 @@ impl<'a> Comparison<'a> {
         let loss = loss_of(&found);
         let windows = problem.shooting.windows.iter();
         let all_s: f64 = windows.map(|w| w.duration_s(problem.logs)).sum();
-        // The present logs did not discriminate, whatever the noise suggests: they hold no more than was needed.
+        // The present logs did not discriminate, whatever the noise suggests: they hold no more data than needed.
         let too_sure = loss / present.duration_s(0..) * all_s / settings.lead;
-        let differences = differences(&shooting, &other, &values, &found.locals, 0);
+        let differences = differences(&shooting, &other, &values, &found.start_states, 0);
         Some(Self {
             inflation: inflation(problem, fitted).max(too_sure),
             other: Hypothesis {
                 dynamics: values.put_into(&other.dynamics, &present.logs),
                 ..other
             },
-            locals: found.locals,
+            start_states: found.start_states,
             differences,
             problem,
             truth,
@@ -146,7 +154,7 @@ impl<'a> Comparison<'a> {
         })
     }
 
-    /// Every experiment that the rig can do, simulated, to tell apart effects on these joints.
+    /// Simulate every experiment that the rig can do to distinguish effects on these joints.
     pub fn trials(&self, fitted: &Fitted, joints: &[Joint]) -> Vec<Trial> {
         let changes = experiments(self.problem, fitted, joints);
         let changes = (changes.par_iter()).filter_map(|change| self.test(change, None));
@@ -185,7 +193,7 @@ impl<'a> Comparison<'a> {
         }
     }
 
-    /// Simulate an experiment; `None` where the rig cannot do it.
+    /// Simulate an experiment; `None` if the rig cannot do it.
     fn test(&self, experiment: &Experiment, payload: Option<&Payload>) -> Option<Trial> {
         let (truth, other) = (self.truth.with(payload), self.other.with(payload));
         let proposed = truth
@@ -194,12 +202,12 @@ impl<'a> Comparison<'a> {
         let both = self.present.and(&proposed);
         let shooting =
             Shooting::new(&both.logs, both.windows.clone(), &self.noise).with_free_starts();
-        let present = self.locals.len();
-        let locals = [self.locals.clone(), both.starts(present..)].concat();
-        let (values, found) = other.refit(&shooting, locals)?;
+        let present = self.start_states.len();
+        let start_states = [self.start_states.clone(), both.starts(present..)].concat();
+        let (values, found) = other.refit(&shooting, start_states)?;
         let duration_s = both.duration_s(present..);
         let rate = (loss_of(&found) - self.loss).max(0.0) / duration_s;
-        let differences = differences(&shooting, &other, &values, &found.locals, present);
+        let differences = differences(&shooting, &other, &values, &found.start_states, present);
         let share = |joint: &Joint| differences[*joint] / self.noise[*joint];
         let joint = Joint::all(differences.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
         Some(Trial {
@@ -233,7 +241,7 @@ fn window_of(problem: &Problem<'_>, fitted: &Fitted, w: usize) -> Motion {
     let rows = window.first..=window.last;
     Motion {
         log: window.log,
-        start: fitted.fit.locals[w].clone(),
+        start: fitted.fit.start_states[w].clone(),
         time: log.time[rows.clone()].to_vec(),
         tau: rows
             .map(|row| log.tau.iter().map(|tau| tau[row]).collect())
@@ -246,16 +254,16 @@ fn loss_of(fit: &Fit) -> f64 {
     2.0 * fit.scale * fit.scale * fit.cost
 }
 
-/// Difference of the positions that a fit leaves on each joint, root mean square over the windows from `first` on.
+/// Root mean square position difference that a fit leaves on each joint, over the windows from `first` on.
 fn differences(
     shooting: &Shooting<'_>,
     model: &Hypothesis,
     values: &Values,
-    locals: &[Vec<f64>],
+    start_states: &[Vec<f64>],
     first: usize,
 ) -> Vec<f64> {
     let n = model.dynamics.joints;
-    let residuals = shooting.residuals(&model.dynamics, values, locals);
+    let residuals = shooting.residuals(&model.dynamics, values, start_states);
     let residuals: Vec<f64> = residuals[first..].concat();
     let square = |j: usize| {
         residuals
@@ -272,8 +280,8 @@ fn differences(
         .collect()
 }
 
-/// How much more the estimates of a fit scatter than independent normal residuals of its scale would let them, as a
-/// ratio of variances, at least 1: residuals of measured logs are correlated.
+/// How much more the estimates of a fit scatter than with independent normal residuals of its scale, as a ratio of
+/// variances, at least 1: residuals of measured logs are correlated.
 fn inflation(problem: &Problem<'_>, fitted: &Fitted) -> f64 {
     let size = fitted.fit.columns.len();
     let covariance = uncertainty(&problem.shooting, &fitted.fit).covariance;

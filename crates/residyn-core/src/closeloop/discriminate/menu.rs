@@ -6,14 +6,14 @@ use crate::data::{Joint, Quantity, row_after};
 /// The torque, or the command, of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Drive {
-    /// The logged one times a factor, run off at another pace.
+    /// The logged one times a factor, run at another pace.
     Logged {
         factor: f64,
         pace: f64,
     },
-    /// The logged one and, on one joint, so many times its largest on top.
+    /// The logged one plus, on one joint, this many times its largest value.
     Added(f64),
-    /// A triangle on one joint, from zero up, down and back, to this share of its largest.
+    /// A triangle on one joint, from zero up, down and back, with this share of its largest value.
     Ramps(f64),
     Nothing,
 }
@@ -21,25 +21,25 @@ enum Drive {
 /// Where motions begin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Start {
-    /// In states that the logs show, their velocities times a factor.
+    /// In logged states, with velocities times a factor.
     Logged(f64),
-    /// There, with one joint at so many times its top speed.
+    /// In logged states, with one joint at this many times its top speed.
     TopSpeed(f64),
-    /// At rest where each log begins.
+    /// At rest, where each log begins.
     Rest,
 }
 
-/// One experiment that the rig of the logs might do.
+/// One experiment that the logged rig might do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MenuItem {
-    /// What to do; `{joint}`, `{speed}` (rad/s or m/s), `{driving}` (torque or command) and `{size}` stand for what
-    /// the logs say.
+    /// What to do; `{joint}`, `{speed}` (rad/s or m/s), `{driving}` (torque or command) and `{size}` stand for values
+    /// from the logs.
     text: &'static str,
     drive: Drive,
     start: Start,
-    /// Rows in place of each row.
+    /// Number of rows in place of each logged row.
     finer: u32,
-    /// Applies only where the joint makes full turns.
+    /// Whether the item applies only if the joint then makes full turns.
     turns: bool,
 }
 
@@ -81,7 +81,7 @@ const fn turning(text: &'static str, torque: f64) -> MenuItem {
     }
 }
 
-/// Ordered by how little each changes the user's own experiment.
+/// Ordered by how little each item changes the user's experiment.
 const MENU: [MenuItem; 12] = [
     AS_LOGGED,
     MenuItem {
@@ -131,8 +131,8 @@ pub(super) struct Experiment {
     pub turns: Option<Joint>,
 }
 
-/// What the rig of the logs could do to tell apart effects on these joints. `model` is fitted to the logs: its start
-/// states are where motions begin.
+/// Experiments that the logged rig could do to distinguish effects on these joints. `fitted` is fitted to the logs:
+/// motions begin at its start states.
 pub(super) fn experiments(
     problem: &Problem<'_>,
     fitted: &Fitted,
@@ -165,7 +165,7 @@ pub(super) fn as_logged(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Motion> {
 
 impl MenuItem {
     fn is_possible(&self, problem: &Problem<'_>, joint: Joint) -> bool {
-        // No torque comes of no command only where commands are torques.
+        // A zero command gives zero torque only if commands are torques.
         let coasts = problem.declared.driven_by() == Quantity::Torque;
         let driven = match self.drive {
             _ if *self == AS_LOGGED => true,
@@ -220,7 +220,7 @@ impl MenuItem {
         };
         starts
             .into_iter()
-            .map(|w| self.motion(problem, w, &fitted.fit.locals[w], joint))
+            .map(|w| self.motion(problem, w, &fitted.fit.start_states[w], joint))
             .collect()
     }
 
@@ -286,7 +286,7 @@ impl MenuItem {
     }
 }
 
-/// Torques or commands with more on one joint.
+/// Torques or commands with `more` added on one joint.
 fn with(driving: impl Iterator<Item = f64>, joint: Joint, more: f64) -> Vec<f64> {
     let mut driving: Vec<f64> = driving.collect();
     driving[joint] += more;
@@ -313,7 +313,7 @@ fn goes_round(problem: &Problem<'_>, joint: Joint) -> bool {
         .any(|log| super::motion::is_turn(&log.q[joint]))
 }
 
-/// At most `most` of the numbers below `count`, evenly spread.
+/// At most `most` evenly spread numbers below `count`.
 pub(super) fn spread(count: usize, most: usize) -> Vec<usize> {
     let taken = count.min(most);
     (0..taken).map(|k| k * count / taken).collect()

@@ -14,15 +14,15 @@ pub(super) struct Motion {
     pub start: Vec<f64>,
     /// Time of each row in s.
     pub time: Vec<f64>,
-    /// `[row][joint]`, each held until the next row.
+    /// Torques, `[row][joint]`, each held until the next row.
     pub tau: Vec<Vec<f64>>,
 }
 
-/// Simulated logs, each of motions one after the other.
+/// Simulated logs, each a sequence of motions.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Record {
     pub logs: Vec<Log>,
-    /// For each of them the log of the problem that its motions begin in: what differs by log is as it was there.
+    /// For each log, the problem's log that its motions begin in, from which per-log values are taken.
     pub origins: Vec<usize>,
     /// The rows of each motion.
     pub motions: Vec<Window>,
@@ -31,9 +31,8 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Motions as a model has them that begin in these `logs`, cut into windows of `length_s`; the rig stands for
-    /// `pause_s` between two of one log. What differs by log is as
-    /// it is there. `None` where the model diverges.
+    /// Simulated motions that begin in these `logs`, cut into windows of `length_s`; the rig stands for `pause_s`
+    /// between two motions of one log. Per-log values are those of `logs`. `None` if the model diverges.
     pub fn of(
         motions: &[Motion],
         logs: &[Log],
@@ -62,7 +61,7 @@ impl Record {
         Some(record)
     }
 
-    /// Number of the record's log for motions that begin in a log of the problem: it is called as that log is.
+    /// Number of the record's log for motions that begin in a log of the problem; it has that log's name.
     fn log_of(&mut self, origin: usize, log: &Log) -> usize {
         if let Some(known) = self.origins.iter().position(|known| *known == origin) {
             return known;
@@ -76,7 +75,7 @@ impl Record {
         self.logs.len() - 1
     }
 
-    /// This record and then another one, its logs apart.
+    /// This record followed by another, with separate logs.
     pub fn and(&self, other: &Self) -> Self {
         let joined = |own: &[Window], others: &[Window]| {
             let moved = others.iter().map(|window| Window {
@@ -103,14 +102,14 @@ impl Record {
         self.windows[windows].iter().map(start).collect()
     }
 
-    /// Length in s of the windows from a number on.
+    /// Total length in s of these windows.
     pub fn duration_s(&self, windows: std::ops::RangeFrom<usize>) -> f64 {
         let windows = self.windows[windows].iter();
         windows.map(|w| w.duration_s(&self.logs)).sum()
     }
 }
 
-/// Add the torques of a motion to a log, after a pause; the row at which it begins.
+/// Append the torques of a motion to a log, after a pause, and return the row at which it begins.
 fn append(log: &mut Log, motion: &Motion, pause_s: f64) -> usize {
     let earliest = log
         .time
@@ -128,13 +127,13 @@ fn append(log: &mut Log, motion: &Motion, pause_s: f64) -> usize {
     log.time.len() - motion.time.len()
 }
 
-/// Fill in the states of a model from row `first` to the end of a log; `None` where it diverges.
+/// Fill in the states of a model from row `first` to the end of a log; `None` if it diverges.
 fn simulate(log: &mut Log, first: usize, start: &[f64], model: &Dynamics) -> Option<()> {
     let commanded = log.clone();
     let commands = [&Commands::of_log(model, &commanded)];
     let mut simulator = Simulator::new(model, RK4);
     simulator.put(start);
-    // The row of the pause, which nothing reads, is as the motion begins.
+    // The row of the pause, which nothing reads, has the start state.
     let columns = log.q.iter_mut().chain(&mut log.qd);
     columns
         .zip(start)
@@ -155,14 +154,14 @@ fn simulate(log: &mut Log, first: usize, start: &[f64], model: &Dynamics) -> Opt
     Some(())
 }
 
-/// Whether a joint goes round.
+/// Whether a joint makes more than a full turn.
 pub(super) fn is_turn(q: &[f64]) -> bool {
     let low = q.iter().copied().fold(f64::INFINITY, f64::min);
     let high = q.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     high - low > TAU
 }
 
-/// Consecutive windows of `length_s` from a row on.
+/// Consecutive windows of `length_s` from row `first` on.
 fn windows(log: &Log, index: usize, first: usize, length_s: f64) -> Vec<Window> {
     let step_s = log.median_step();
     let mut windows = Vec::new();

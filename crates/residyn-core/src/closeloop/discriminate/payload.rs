@@ -6,18 +6,18 @@ use crate::model::{Dynamics, Parameter};
 pub(super) struct Payload {
     /// Index of the parameter.
     pub parameter: usize,
-    /// Of the parameter.
+    /// Share of the parameter that the payload adds.
     pub share: f64,
-    /// The same in the parameter's unit.
+    /// The amount added, in the parameter's unit.
     pub extra: f64,
-    /// Logs with the payload are this much (s) later than they would be.
+    /// Logs with the payload are shifted later by this time (s).
     pub delay_s: f64,
 }
 
-/// Units of what a payload adds to.
+/// Units of the parameters that a payload adds to.
 const OF_MASS: [&str; 2] = ["kg", "kg m^2"];
 impl Payload {
-    /// A payload for each of the first `declared` parameters that one can add to.
+    /// A payload for each of the first `declared` parameters that a payload can add to.
     pub fn all(dynamics: &Dynamics, declared: usize, share: f64, delay_s: f64) -> Vec<Self> {
         let carries = |k: &usize| OF_MASS.contains(&dynamics.parameters[*k].unit.as_str());
         let of = |parameter: usize| Self {
@@ -38,8 +38,8 @@ impl Payload {
         )
     }
 
-    /// The model of a rig that carries the payload in the later logs and not in the others: one program for both, so
-    /// that one fit can use both.
+    /// The model of a rig that carries the payload only in the later logs: one program, so that one fit can use all
+    /// logs.
     pub fn on(&self, dynamics: &Dynamics) -> Dynamics {
         let mut graph = Graph::new();
         let mut inputs: Vec<_> = (dynamics.program.inputs().iter())

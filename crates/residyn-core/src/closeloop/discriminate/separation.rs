@@ -8,34 +8,34 @@ use crate::closeloop::select::Rival;
 use crate::closeloop::settings::DiscriminateSettings;
 use crate::data::Joint;
 
-/// How far two explanations differ in the experiment that tells them apart best.
+/// How far two explanations differ in the experiment that distinguishes them best.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Separation {
-    /// What to do; `None` where nothing that was simulated tells them apart.
+    /// What to do; `None` if no simulated experiment distinguishes them.
     pub experiment: Option<String>,
     /// The joint on which the difference shows most.
     pub joint: Joint,
-    /// Difference of the positions, root mean square over half a second ahead, after one has been refitted to what
-    /// the other does, in rad (or m).
+    /// Root mean square position difference over half a second ahead, after one explanation has been refitted to the
+    /// motion of the other, in rad (or m).
     #[schemars(range(min = 0))]
     pub difference_rad: f64,
-    /// The same in the present logs.
+    /// Root mean square position difference in the present logs, in rad (or m).
     #[schemars(range(min = 0))]
     pub present_difference_rad: f64,
-    /// What the model of the present logs does not explain of a position, standard deviation in rad (or m).
+    /// Standard deviation of the position that the model does not explain in the present logs, in rad (or m).
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub noise_rad: f64,
-    /// Length in s of logs of the experiment that suffice.
+    /// Sufficient length in s of the experiment's logs.
     pub seconds: Option<f64>,
     #[serde(skip)]
     slides: bool,
 }
 
-/// The experiment that would tell a rival from the model chosen, by T-optimality (Atkinson and Fedorov 1975): each
-/// experiment of the menu is simulated with one of the two, the other is refitted to it and to the present logs
-/// together, all its parameters and start states free, and the remaining difference is compared with the noise.
-/// A rival that contains the chosen effect is the one simulated, at the size fitted: it could follow the other anywhere.
-/// `None` where not even the present motion can be simulated.
+/// The experiment that would distinguish a rival from the chosen model, by T-optimality (Atkinson and Fedorov 1975):
+/// each experiment of the menu is simulated with one of the two, the other is refitted to it and to the present logs
+/// together, with all parameters and start states free, and the remaining difference is compared with the noise. A
+/// rival that contains the chosen effect is the one simulated, at its fitted size: refitted, it could follow the other
+/// anywhere. `None` if not even the present motion can be simulated.
 pub(super) fn separation(
     problem: &Problem<'_>,
     fitted: &Fitted,
@@ -68,7 +68,7 @@ pub(super) fn separation(
 }
 
 impl Separation {
-    /// In a sentence.
+    /// The separation in a sentence.
     pub fn text(&self) -> String {
         let milli = |x: f64| {
             let x = 1e3 * x;
@@ -94,7 +94,7 @@ impl Separation {
 }
 
 impl Trial {
-    /// Length in s by which experiments are ranked: short ones are equal.
+    /// Length in s by which experiments are ranked: short experiments rank equal.
     fn worth(&self, settings: &DiscriminateSettings) -> f64 {
         self.seconds.max(settings.equally_short_s)
     }

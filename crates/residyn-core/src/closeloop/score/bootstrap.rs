@@ -2,12 +2,12 @@ use rand::Rng;
 
 use crate::closeloop::settings::ScoreSettings;
 use crate::data::statistics::bootstrap;
-use crate::identify::{BLOCK_S, stretches};
+use crate::identify::{BLOCK_S, blocks_of_times};
 use crate::sim::metric::OpenLoop;
 
-/// 95 % interval of the relative reduction of the position error (all joints together) from `before` to
-/// `after`, by resampling whole trajectories or, where there are fewer than five, stretches of two seconds.
-/// `None` for fewer than three of them.
+/// 95 % interval of the relative reduction of the position error (all joints together) from `before` to `after`, by
+/// resampling whole trajectories or, if there are fewer than five, blocks of two seconds. `None` for fewer than three
+/// trajectories or blocks.
 pub fn reduction_interval(
     before: &OpenLoop,
     after: &OpenLoop,
@@ -21,7 +21,7 @@ pub fn reduction_interval(
     )
 }
 
-/// The same from the squared errors before and after of each block.
+/// The same, from each block's squared errors before and after.
 pub fn interval(
     blocks: &[(f64, f64)],
     settings: &ScoreSettings,
@@ -50,7 +50,7 @@ fn blocks(before: &OpenLoop, after: &OpenLoop, whole_logs: usize) -> Vec<(f64, f
         let start_s = if logs >= whole_logs { 0.0 } else { w.start_s };
         (w.log, start_s)
     });
-    let members = stretches(starts, BLOCK_S);
+    let members = blocks_of_times(starts, BLOCK_S);
     let mut blocks = vec![(0.0, 0.0); members.last().map_or(0, |last| last + 1)];
     for ((b, a), member) in before.windows.iter().zip(&after.windows).zip(members) {
         blocks[member].0 += b.position.iter().sum::<f64>();

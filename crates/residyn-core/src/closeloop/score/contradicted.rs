@@ -5,13 +5,13 @@ use crate::model::Parameter;
 pub struct Contradicted {
     /// The value in the file, in the parameter's unit.
     pub declared: f64,
-    /// The parameter as fitted with the effects that were found; its 95 % interval does not hold the declared value.
-    /// Without those effects the fit would bend the declared parameters to make up for what is missing.
+    /// The parameter as fitted with the effects that were found; its 95 % interval does not contain the declared value.
+    /// Without those effects the fit would bias the declared parameters to make up for what is missing.
     pub fitted: Parameter,
 }
 
-/// The declared values that lie outside of the intervals of the fitted ones. Both are in the same order, and further
-/// fitted ones may follow. A parameter without an interval was not fitted and contradicts nothing; one that is declared
+/// The declared values that lie outside the intervals of the fitted ones. Both are in the same order, and further
+/// fitted parameters may follow. A parameter without an interval was not fitted and contradicts nothing; one declared
 /// fixed has another value only as a finding, `parameter_shift`.
 pub(in crate::closeloop) fn contradicted(
     declared: &[Parameter],

@@ -10,7 +10,7 @@ use crate::closeloop::refine::Refined;
 use crate::closeloop::select::{Losses, p_of_gains, p_value};
 use crate::digits::amount_of;
 use crate::identify::FitError;
-use crate::model::{FittedEffect, Model, OwnValue, Parameter, Status};
+use crate::model::{FittedEffect, Model, Parameter, PerLogValue, Status};
 
 /// One effect that was added.
 #[derive(Debug, Clone)]
@@ -19,11 +19,10 @@ pub struct Finding {
     pub expression: String,
     /// With intervals.
     pub parameters: Vec<Parameter>,
-    /// Of the parameters that switch the effect on; of an effect without such a parameter, of the fall of the loss on
-    /// left-out stretches. 1 where the refit without the effect that this takes fails.
+    /// For the parameters that switch the effect on or, for an effect without such a parameter, for the fall of the
+    /// loss on left-out blocks. 1 if the refit without the effect, which this needs, fails.
     pub p_value: f64,
-    /// Share of the compared error on the test logs that this effect alone takes away, or why the refit without it
-    /// failed.
+    /// Share of the compared error on the test logs that this effect alone removes, or why the refit without it failed.
     pub error_reduction: Result<f64, FitError>,
     pub status: Status,
     /// Why it is not established, in a sentence.
@@ -31,8 +30,8 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// The value of each parameter or, where it has one per log, its values in single logs.
-    pub fn rows(&self) -> Vec<(Parameter, Option<&OwnValue>)> {
+    /// The value of each parameter or, if it has one per log, its values in single logs.
+    pub fn rows(&self) -> Vec<(Parameter, Option<&PerLogValue>)> {
         let of_parameter = |(k, parameter): (usize, &Parameter)| {
             if !parameter.per_log {
                 return vec![(parameter.clone(), None)];
@@ -61,8 +60,8 @@ impl Display for Finding {
     }
 }
 
-/// A value of a finding, with the log where it holds in one alone.
-fn own_value((parameter, own): &(Parameter, Option<&OwnValue>)) -> String {
+/// A value of a finding, with the log if it holds in one log only.
+fn own_value((parameter, own): &(Parameter, Option<&PerLogValue>)) -> String {
     let amount = amount_of(parameter.value, parameter.ci95, &parameter.unit);
     let log = own.map_or_else(String::new, |own| format!(" in {}", own.log_name()));
     format!("{} = {amount}{log}", parameter.name)
@@ -77,12 +76,12 @@ pub(in crate::closeloop) fn findings(
     scorer: &Scorer<'_>,
 ) -> Vec<Finding> {
     let (chosen, standings) = (&chosen.after, &chosen.standings);
-    let with = scorer.compared(problem.space, chosen);
+    let with = scorer.compared(problem.error_model, chosen);
     let added = problem.added(&refined.after.model);
     let finding = |(k, standing): (usize, &Standing)| {
-        // Both as effects were selected, in coarse steps.
+        // Both in the coarse steps that effects were selected with.
         let less = &standing.without;
-        let error = |less: &Fitted| scorer.compared(problem.space, less);
+        let error = |less: &Fitted| scorer.compared(problem.error_model, less);
         let reduction = |less: &Fitted| 1.0 - with / error(less).max(f64::MIN_POSITIVE);
         let (expression, parameters) = described(problem.declared, &refined.after.model, k);
         Finding {
@@ -103,7 +102,7 @@ pub(in crate::closeloop) fn findings(
     added.into_par_iter().zip(standings).map(finding).collect()
 }
 
-/// The signed-rank p-value of a model beside the refit without one of its effects.
+/// The signed-rank p-value of a model against the refit without one of its effects.
 fn p_of_refit(
     problem: &Problem<'_>,
     chosen: &Fitted,
@@ -114,7 +113,8 @@ fn p_of_refit(
     p_of_gains(&losses(without), &losses(chosen))
 }
 
-/// What the k-th effect of a model adds, and the parameters that it is reported with: of a shift, what is shifted.
+/// What the k-th effect of a model adds, and the parameters that it is reported with: for a shift, the shifted
+/// parameter.
 fn described(declared: &Model, model: &Model, k: usize) -> (String, Vec<Parameter>) {
     let effect = &model.effects[k];
     match effect.shifted() {

@@ -2,10 +2,10 @@ use rand::Rng;
 
 use super::bootstrap::{interval, reduction_interval};
 use super::test_log::TestLog;
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::request::Reference;
 use crate::closeloop::settings::ScoreSettings;
-use crate::closeloop::space::Space;
 use crate::data::Log;
 use crate::identify::calibrate_first;
 use crate::model::{Dynamics, Model};
@@ -17,21 +17,21 @@ pub struct Errors {
     pub declared: Assessment,
     /// The declared model, fitted.
     pub before: Assessment,
-    /// The declared model with Coulomb and viscous friction on every joint, fitted: what most would try first. `None` where it
-    /// has both already, and where no effects are looked for.
+    /// The declared model with Coulomb and viscous friction on every joint, fitted: what most would try first. `None`
+    /// if it already has both, and if no effects are looked for.
     pub with_friction: Option<Assessment>,
     /// With the effects that were found, fitted.
     pub after: Assessment,
-    /// The same with the zeros of each test log's sensors estimated on its beginning, scored on the rest; where a zero
-    /// per log is part of the model, and the logs are long enough.
+    /// The same with each test log's sensor zeros estimated on its beginning, scored on the rest; if the model has
+    /// zeros per log, and the logs are long enough.
     pub zeroed: Option<Assessment>,
     /// With the residual network.
     pub hybrid: Option<Assessment>,
     /// Other models as they are, by name.
     pub against: Vec<(String, Assessment)>,
-    /// Of the torques that the logged motion needs; where the model has torques.
+    /// Errors of the torques that the logged motion needs, if the model has torques.
     pub torque: Option<TorqueErrors>,
-    /// Of the two fitted models on each test log; empty for a single one.
+    /// Errors of the two fitted models on each test log; empty for a single log.
     pub by_log: Vec<TestLog>,
     /// 95 % interval of the relative reduction of the position error, before to after.
     pub reduction_ci95: Option<[f64; 2]>,
@@ -52,9 +52,11 @@ pub struct TorqueErrors {
 
 impl Errors {
     /// The errors of the fitted declared model and of the one with effects, in one number each.
-    pub fn compared(&self, space: Space) -> [f64; 2] {
-        match (space, &self.torque) {
-            (Space::Torque, Some(torque)) => [torque.before.relative, torque.after.relative],
+    pub fn compared(&self, error_model: ErrorModel) -> [f64; 2] {
+        match (error_model, &self.torque) {
+            (ErrorModel::InverseDynamics, Some(torque)) => {
+                [torque.before.relative, torque.after.relative]
+            }
             _ => [self.before.position_rms(), self.after.position_rms()],
         }
     }
@@ -63,8 +65,8 @@ impl Errors {
 /// The models that are compared.
 #[derive(Clone, Copy)]
 pub(in crate::closeloop) struct Scored<'m> {
-    /// By which errors.
-    pub space: Space,
+    /// The errors by which they are compared.
+    pub error_model: ErrorModel,
     /// With the values in its file.
     pub declared: &'m Model,
     pub before: &'m Fitted,
@@ -82,7 +84,7 @@ pub(in crate::closeloop) struct Scorer<'a> {
 }
 
 impl Scorer<'_> {
-    /// Score each of them.
+    /// Score each model.
     pub fn errors(&self, models: Scored<'_>, rng: &mut impl Rng) -> Errors {
         let scored = |other: &Reference| (other.name.clone(), self.as_it_is(&other.model));
         let torque = self.torques(models, rng);
@@ -95,7 +97,7 @@ impl Scorer<'_> {
             against: models.against.iter().map(scored).collect(),
             reduction_ci95: reduction_interval(before.middle(), after.middle(), self.settings, rng),
             zeroed: self.zeroed(models.after),
-            by_log: self.log_by_log(models.space, fitted, [&before, &after]),
+            by_log: self.log_by_log(models.error_model, fitted, [&before, &after]),
             torque,
             before,
             after,
@@ -105,8 +107,8 @@ impl Scorer<'_> {
     fn torques(&self, models: Scored<'_>, rng: &mut impl Rng) -> Option<TorqueErrors> {
         let error = |model: &Model| torque_error(model, self.test);
         let (before, after) = (error(&models.before.model)?, error(&models.after.model)?);
-        let stretches = before.stretches.iter().copied();
-        let blocks: Vec<(f64, f64)> = stretches.zip(after.stretches.iter().copied()).collect();
+        let blocks = before.blocks.iter().copied();
+        let blocks: Vec<(f64, f64)> = blocks.zip(after.blocks.iter().copied()).collect();
         Some(TorqueErrors {
             reduction_ci95: interval(&blocks, self.settings, rng),
             declared: error(models.declared)?,
@@ -117,10 +119,10 @@ impl Scorer<'_> {
     }
 
     /// The error of a fitted model, in one number.
-    pub fn compared(&self, space: Space, fitted: &Fitted) -> f64 {
-        match space {
-            Space::Motion => self.fitted(fitted).position_rms(),
-            Space::Torque => {
+    pub fn compared(&self, error_model: ErrorModel, fitted: &Fitted) -> f64 {
+        match error_model {
+            ErrorModel::OutputError => self.fitted(fitted).position_rms(),
+            ErrorModel::InverseDynamics => {
                 let error = torque_error(&fitted.model, self.test);
                 error.map_or(f64::NAN, |error| error.relative)
             }

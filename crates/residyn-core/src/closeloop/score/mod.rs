@@ -27,7 +27,7 @@ use super::refine::Refined;
 use super::stage::{Stage, Watch};
 use super::verdict::{Verdict, verdict};
 
-/// What the models are worth.
+/// How well the models predict, and what follows.
 pub struct Scores {
     pub errors: Errors,
     pub verdict: Verdict,
@@ -37,12 +37,12 @@ pub struct Scores {
     pub findings: Vec<Finding>,
     /// The chosen model fitted to each training log alone.
     pub by_log: Vec<OfLog>,
-    /// What the models predict of the test logs.
+    /// What the models predict for the test logs.
     pub predictions: Predictions,
 }
 
-/// Score the models on the test logs, and say what follows. Beside the refined ones these are the declared model with the usual
-/// friction and the one with the residual network, where there are such.
+/// Score the models on the test logs, and say what follows. Besides the refined models these are the declared model
+/// with the usual friction and the model with the residual network, if there are any.
 pub fn score(
     prepared: &Prepared<'_>,
     found: &Found<'_>,
@@ -59,7 +59,7 @@ pub fn score(
     };
     let without_network = refined.after.model.absorbed().dynamics();
     let models = Scored {
-        space: problem.space,
+        error_model: problem.error_model,
         declared: prepared.model,
         before: &refined.before,
         with_friction: with_friction.filter(|model| !problem.added(&model.model).is_empty()),

@@ -1,33 +1,34 @@
 use rayon::prelude::*;
 
 use super::errors::{Scored, Scorer};
-use crate::closeloop::space::Space;
+use crate::closeloop::error_model::ErrorModel;
 use crate::data::Log;
 use crate::model::Dynamics;
 use crate::sim::metric::{NeededTorques, Trace, needed_torques, traces};
 
-/// What the models predict of the test logs, for pictures.
+/// What the models predict for the test logs, for plots.
 pub struct Predictions {
-    /// Over the longest horizon, one a test log: differences between models grow with the horizon. Empty where torques are compared.
+    /// Over the longest horizon, one per test log: differences between models grow with the horizon. Empty if torques
+    /// are compared.
     pub longest: Vec<Predicted>,
-    /// Over the middle horizon, of the first test log.
+    /// Over the middle horizon, for the first test log.
     pub middle: Option<Predicted>,
-    /// One a test log, where torques are compared.
+    /// One per test log, if torques are compared.
     pub torques: Vec<Needed>,
 }
 
-/// Predictions of a log by several models, one after the other, each of them started from the log.
+/// Consecutive predictions of a log by several models, each started from the log.
 pub struct Predicted {
     pub horizon_s: f64,
     /// Of the declared model, fitted.
     pub before: Vec<Trace>,
     /// With effects.
     pub after: Vec<Trace>,
-    /// With the residual network, where there is one.
+    /// With the residual network, if there is one.
     pub hybrid: Option<Vec<Trace>>,
 }
 
-/// The torques that the motion of a log needs by two models; `None` for one that gives accelerations.
+/// The torques that a log's motion needs according to two models; `None` for a model that gives accelerations.
 pub struct Needed {
     pub before: Option<NeededTorques>,
     /// With effects.
@@ -35,7 +36,7 @@ pub struct Needed {
 }
 
 impl Scorer<'_> {
-    /// What the models predict of the test logs; `network` is the model with the network.
+    /// What the models predict for the test logs; `network` is the model with the network.
     pub fn predictions(&self, models: Scored<'_>, network: Option<&Dynamics>) -> Predictions {
         let fitted = [models.before, models.after];
         let [before, after] = fitted.map(|fitted| fitted.model.dynamics());
@@ -52,9 +53,9 @@ impl Scorer<'_> {
             Needed { before, after }
         };
         let logs = self.test.par_iter();
-        let (longest, torques) = match models.space {
-            Space::Motion => (logs.map(of_motion).collect(), Vec::new()),
-            Space::Torque => (Vec::new(), logs.map(of_torques).collect()),
+        let (longest, torques) = match models.error_model {
+            ErrorModel::OutputError => (logs.map(of_motion).collect(), Vec::new()),
+            ErrorModel::InverseDynamics => (Vec::new(), logs.map(of_torques).collect()),
         };
         let first = self.test.first();
         Predictions {

@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::errors::Scorer;
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::space::Space;
 use crate::sim::metric::{Assessment, OpenLoop, summarise, torque_error};
 
 /// The errors of the fitted declared model and of the one with effects on one test log, joint by joint: of positions at the
@@ -23,16 +23,16 @@ impl Scorer<'_> {
     /// The errors on each test log that is long enough; empty for a single log.
     pub fn log_by_log(
         &self,
-        space: Space,
+        error_model: ErrorModel,
         models: [&Fitted; 2],
         motion: [&Assessment; 2],
     ) -> Vec<TestLog> {
         if self.test.len() < 2 {
             return Vec::new();
         }
-        let error = |model: usize, log: usize| match space {
-            Space::Motion => of_motion(motion[model].middle(), log),
-            Space::Torque => {
+        let error = |model: usize, log: usize| match error_model {
+            ErrorModel::OutputError => of_motion(motion[model].middle(), log),
+            ErrorModel::InverseDynamics => {
                 let log = slice::from_ref(&self.test[log]);
                 Some(torque_error(&models[model].model, log)?.rms)
             }

@@ -10,8 +10,8 @@ use crate::identify::{
 };
 use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect};
 
-/// Every effect of the library on every joint where it can act and where it is not in the model yet, and every
-/// shift of a parameter that the file declares fixed.
+/// Every effect of the library on every joint where it can act and is not yet in the model, and every shift of a
+/// parameter that the file declares fixed.
 pub fn candidates(problem: &Problem<'_>, present: &[FittedEffect]) -> Vec<FittedEffect> {
     let mut all: Vec<FittedEffect> = problem.declared.shifts();
     all.extend(acting(problem, problem.effects()));
@@ -22,10 +22,13 @@ pub fn candidates(problem: &Problem<'_>, present: &[FittedEffect]) -> Vec<Fitted
 /// These effects on every joint where each can act and be observed.
 pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
-    for effect in effects.iter().filter(|effect| problem.space.shows(effect)) {
+    for effect in effects
+        .iter()
+        .filter(|effect| problem.error_model.shows(effect))
+    {
         for joint in Joint::all(problem.declared.joints) {
             if is_driven_enough(problem, effect, joint)
-                && !is_told_by_bodies(problem, effect)
+                && !is_identified_by_bodies(problem, effect)
                 && !is_of_too_many(problem, effect)
                 && problem.declared.can_carry(effect, joint).is_ok()
             {
@@ -40,23 +43,24 @@ pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     all
 }
 
-/// A load at the tip is no other torque where the bodies are free: what is declared of them tells it, in a stage of its own.
-fn is_told_by_bodies(problem: &Problem<'_>, effect: &Effect) -> bool {
+/// With free bodies, no torque distinguishes a load at the tip from the last body: only the declared values do, in a
+/// separate stage.
+fn is_identified_by_bodies(problem: &Problem<'_>, effect: &Effect) -> bool {
     matches!(effect.entry, Entry::Payload(_)) && problem.has_free_bodies()
 }
 
-/// An effect with a value for each log, of more logs than those are looked for in.
+/// Whether an effect has a value for each log and there are too many logs to consider it.
 pub fn is_of_too_many(problem: &Problem<'_>, effect: &Effect) -> bool {
     problem.logs.len() > problem.settings.select.most_logs_of_own_values
         && effect.parameters.iter().any(|parameter| parameter.per_log)
 }
 
-/// Effects of the torque cannot be observed where there is none.
+/// Effects of the torque cannot be observed without torque.
 fn is_driven_enough(problem: &Problem<'_>, effect: &Effect, joint: Joint) -> bool {
     !effect.entry.needs_torque() || problem.top_torque[joint] > 0.0
 }
 
-/// The candidate at each of its starting points, every combination of searched values.
+/// The candidate at each of its starting points: every combination of the searched values.
 pub fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
     let mut points = vec![Vec::new()];
     for parameter in &candidate.effect.parameters {
@@ -73,7 +77,7 @@ pub fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
     points.into_iter().map(at).collect()
 }
 
-/// The starting point of a candidate with the largest predicted decrease beside a model, on a sample of the windows.
+/// The starting point of a candidate with the largest predicted decrease of a model's cost, on a sample of the windows.
 pub fn best_start(
     problem: &Problem<'_>,
     fitted: &Fitted,
@@ -83,46 +87,50 @@ pub fn best_start(
     if starts.len() < 2 {
         return starts.pop();
     }
-    let locals = problem.sample.locals(&fitted.fit.locals);
+    let start_states = problem.sample.start_states(&fitted.fit.start_states);
     match has_switch(candidate) {
-        true => best_by_switches(problem, fitted, &starts, &locals),
-        false => best_by_cost(problem, fitted, starts, &locals),
+        true => best_by_switches(problem, fitted, &starts, &start_states),
+        false => best_by_cost(problem, fitted, starts, &start_states),
     }
 }
 
-/// The predicted cost of all windows of a candidate at its values beside a model.
-pub fn promise(problem: &Problem<'_>, fitted: &Fitted, candidate: &FittedEffect) -> Option<f64> {
-    promised(
-        problem,
-        &problem.shooting,
-        fitted,
-        candidate,
-        &fitted.fit.locals,
-    )
-}
-
-/// The same of a sample of the windows.
-pub fn promise_on_sample(
+/// The predicted cost over all windows of a model with a candidate at its values.
+pub fn screened_cost(
     problem: &Problem<'_>,
     fitted: &Fitted,
     candidate: &FittedEffect,
 ) -> Option<f64> {
-    let locals = problem.sample.locals(&fitted.fit.locals);
-    let shooting = &problem.sample.shooting;
-    promised(problem, shooting, fitted, candidate, &locals)
+    linearised_cost(
+        problem,
+        &problem.shooting,
+        fitted,
+        candidate,
+        &fitted.fit.start_states,
+    )
 }
 
-/// The cost of some windows that one Gauss-Newton step predicts for a candidate.
-fn promised(
+/// As [`screened_cost`], over a sample of the windows.
+pub fn screened_cost_on_sample(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    candidate: &FittedEffect,
+) -> Option<f64> {
+    let start_states = problem.sample.start_states(&fitted.fit.start_states);
+    let shooting = &problem.sample.shooting;
+    linearised_cost(problem, shooting, fitted, candidate, &start_states)
+}
+
+/// The cost over the windows that one Gauss-Newton step predicts for a candidate.
+fn linearised_cost(
     problem: &Problem<'_>,
     shooting: &Shooting<'_>,
     fitted: &Fitted,
     start: &FittedEffect,
-    locals: &[Vec<f64>],
+    start_states: &[Vec<f64>],
 ) -> Option<f64> {
     let dynamics = problem.extended(fitted, std::slice::from_ref(start));
     let (active, scale) = (problem.active(&dynamics), fitted.fit.scale);
-    predicted_cost(shooting, &dynamics, &active, locals, scale)
+    predicted_cost(shooting, &dynamics, &active, start_states, scale)
 }
 
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
@@ -142,29 +150,36 @@ pub fn beside(problem: &Problem<'_>, fitted: &Fitted, candidate: &FittedEffect) 
     Some(beside)
 }
 
-/// The starting point that promises the lowest cost on the sample of windows, each compared by a linearisation of its own.
+/// The starting point with the lowest predicted cost on the sample of windows, each linearised separately.
 fn best_by_cost(
     problem: &Problem<'_>,
     fitted: &Fitted,
     starts: Vec<FittedEffect>,
-    locals: &[Vec<f64>],
+    start_states: &[Vec<f64>],
 ) -> Option<FittedEffect> {
-    let promised = |start: FittedEffect| {
-        let cost = promised(problem, &problem.sample.shooting, fitted, &start, locals)?;
+    let predicted = |start: FittedEffect| {
+        let cost = linearised_cost(
+            problem,
+            &problem.sample.shooting,
+            fitted,
+            &start,
+            start_states,
+        )?;
         Some((start, cost))
     };
-    let promised: Vec<(FittedEffect, f64)> = starts.into_par_iter().filter_map(promised).collect();
-    let best = promised.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let predicted: Vec<(FittedEffect, f64)> =
+        starts.into_par_iter().filter_map(predicted).collect();
+    let best = predicted.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(best.0)
 }
 
-/// The same for a candidate that is absent at every starting point, compared by one linearisation of all of them: only
+/// As above, for a candidate that is absent at every starting point: one linearisation compares all of them, since only
 /// the parameters that switch the effect on change anything there.
 fn best_by_switches(
     problem: &Problem<'_>,
     fitted: &Fitted,
     starts: &[FittedEffect],
-    locals: &[Vec<f64>],
+    start_states: &[Vec<f64>],
 ) -> Option<FittedEffect> {
     let numbered = starts.iter().enumerate().map(|(number, start)| {
         let mut start = start.clone();
@@ -184,7 +199,7 @@ fn best_by_switches(
     active.retain(|k| *k < places[0].start || is_switch(k));
     let shooting = &problem.sample.shooting;
     let scale = fitted.fit.scale;
-    let fit = as_it_stands(shooting, &dynamics, &active, locals.to_vec(), scale).ok()?;
+    let fit = as_it_stands(shooting, &dynamics, &active, start_states.to_vec(), scale).ok()?;
     let all = fit.equations_and_prior();
     let cost = |place: &Range<usize>| {
         let is_own = |column: &Column| {
@@ -201,8 +216,7 @@ fn best_by_switches(
     Some(best.1.clone())
 }
 
-/// The minimum of the quadratic cost over some free values, those that would leave their bounds from where they stand
-/// held.
+/// The minimum of the quadratic cost over some free values; values at a bound that would leave it are held.
 fn least_cost(dynamics: &Dynamics, fit: &Fit, all: &WindowTerms, own: &[usize]) -> Option<f64> {
     let mut free = own.to_vec();
     loop {
@@ -228,7 +242,7 @@ fn least_cost(dynamics: &Dynamics, fit: &Fit, all: &WindowTerms, own: &[usize]) 
     }
 }
 
-/// Whether some value of a parameter switches the effect off, so that it can start from absent.
+/// Whether some parameter value switches the effect off, so that it can start from absent.
 pub fn has_switch(candidate: &FittedEffect) -> bool {
     (candidate.effect.parameters.iter()).any(EffectParameter::is_switch)
 }

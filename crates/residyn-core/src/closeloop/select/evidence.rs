@@ -6,13 +6,13 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::identify::{squared_distance, uncertainty};
 
-/// Fall of the loss as a share of what it was.
+/// Fall of the loss as a share of the loss before.
 pub fn gain(before: &[f64], after: &[f64]) -> f64 {
     1.0 - after.iter().sum::<f64>() / before.iter().sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
-/// Probability, by the cluster-robust Wald test, of the fitted values of the k-th effect if it were absent.
-/// `None` for an effect that no value of a parameter switches off.
+/// Probability, by the cluster-robust Wald test, of the fitted values of the k-th effect if it were absent. `None` for
+/// an effect that no parameter value switches off.
 pub fn p_value(problem: &Problem<'_>, fitted: &Fitted, k: usize) -> Option<f64> {
     let effect = &fitted.model.effects[k].effect;
     let range = fitted.model.place_of(k);
@@ -50,16 +50,16 @@ fn f_test(statistic: f64, restrictions: usize, blocks: usize) -> f64 {
         return 1.0;
     }
     let f = statistic * freedom / (q * (blocks as f64 - 1.0));
-    // Values without a spread, as on a joint at rest, say nothing.
+    // Values without spread, as on a joint at rest, are no evidence.
     if !f.is_finite() {
         return 1.0;
     }
     FisherSnedecor::new(q, freedom).map_or(1.0, |law| law.sf(f))
 }
 
-/// One-sided signed-rank test (Wilcoxon 1945) of the fall in loss over stretches, in its normal
-/// approximation: effects that act in a few fast stretches give falls with tails too heavy for a t-test.
-#[allow(clippy::cast_precision_loss)] // few stretches
+/// One-sided signed-rank test (Wilcoxon 1945) of the fall in loss over blocks, in its normal
+/// approximation: effects that act in a few fast blocks give falls with tails too heavy for a t-test.
+#[allow(clippy::cast_precision_loss)] // few blocks
 pub fn p_of_gains(before: &[f64], after: &[f64]) -> f64 {
     let mut falls = differences(before, after);
     falls.retain(|fall| *fall != 0.0);
@@ -72,6 +72,6 @@ pub fn p_of_gains(before: &[f64], after: &[f64]) -> f64 {
     if deviation == 0.0 {
         return 1.0;
     }
-    // Half a rank less, since ranks are whole numbers and the normal law is not.
+    // Continuity correction of half a rank: ranks are whole numbers, the normal law is continuous.
     Normal::standard().sf((sum - 0.5 - mean) / deviation)
 }

@@ -1,20 +1,20 @@
-use super::candidate::{acting, best_start, promise};
+use super::candidate::{acting, best_start, screened_cost};
 use super::identity::EffectId;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::model::{Effect, FittedEffect};
 
-/// A set of effects in which one of a model's is replaced by another.
+/// A set in which one of a model's effects is replaced by another.
 pub(super) struct Exchange {
     pub set: Vec<FittedEffect>,
-    /// Of the effect that is replaced, and of the one in its place.
+    /// Identifies the replaced effect and its replacement.
     pub pair: [EffectId; 2],
 }
 
-/// Sets of effects in which one of a model's is replaced by another that it is easily confused with, on the same joint.
-/// Seen from the model itself, such a pair promises little: each does most of what the other does. An effect with a whole
-/// number, found where the rest of the set was another, is also exchanged for itself with another number: the one that
-/// promises most, and those next to its own.
+/// Sets in which one of a model's effects is replaced by another that it is easily confused with, on the same joint.
+/// Added to the model, such an effect predicts little gain, since each does most of what the other does. An effect with
+/// a whole number, which was found with other effects in the set, is also exchanged for itself with another number: the
+/// one with the largest predicted gain, and those next to the present one.
 pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Exchange> {
     let declared = problem.declared.effects.len();
     let mut sets = Vec::new();
@@ -49,8 +49,8 @@ pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Exchange>
     sets
 }
 
-/// The effect that takes the place of another: at the start that promises most or, where that promises more, at the value
-/// of the old one. What replaces a strong effect is far from absent.
+/// The effect that replaces another: at its best start or, if the prediction is better there, at the value of the old
+/// one. The replacement of a strong effect is far from absent.
 fn in_place_of(
     problem: &Problem<'_>,
     rest: &Fitted,
@@ -58,15 +58,15 @@ fn in_place_of(
     new: &FittedEffect,
 ) -> Option<FittedEffect> {
     let absent = best_start(problem, rest, new)?;
-    let promises_more = |carried: &FittedEffect| {
-        let [carried, absent] = [carried, &absent].map(|start| promise(problem, rest, start));
+    let is_predicted_better = |carried: &FittedEffect| {
+        let [carried, absent] = [carried, &absent].map(|start| screened_cost(problem, rest, start));
         carried.is_some_and(|carried| absent.is_none_or(|absent| carried < absent))
     };
-    let carried = carried_over(old, &absent).filter(promises_more);
+    let carried = carried_over(old, &absent).filter(is_predicted_better);
     Some(carried.unwrap_or(absent))
 }
 
-/// An effect with the whole numbers next to its own among those that are searched.
+/// An effect with the searched whole numbers next to its present one.
 fn with_numbers_beside(
     problem: &Problem<'_>,
     rest: &Fitted,
@@ -95,7 +95,7 @@ fn with_numbers_beside(
     starts
 }
 
-/// An effect at the value of another, where each has one, in the same unit.
+/// An effect at the value of another, if each has one value, in the same unit.
 fn carried_over(old: &FittedEffect, new: &FittedEffect) -> Option<FittedEffect> {
     let ([was], [is]) = (&old.effect.parameters[..], &new.effect.parameters[..]) else {
         return None;

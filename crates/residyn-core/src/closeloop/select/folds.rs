@@ -3,51 +3,52 @@ use nalgebra::{DMatrix, DVector};
 use crate::closeloop::problem::Problem;
 use crate::identify::{Fit, WindowTerms, blocks, with_unit_diagonal};
 
-/// The windows of a problem in stretches that losses are given for, and in groups that are left out of a fit together.
+/// A problem's windows in blocks, for each of which a loss is given, and in groups, which are left out of a fit
+/// together.
 pub struct Folds {
-    /// The stretch of each window.
-    pub stretches: Vec<usize>,
-    /// The group of each stretch: its log or, where there are few logs, a part of it.
+    /// The block of each window.
+    pub blocks: Vec<usize>,
+    /// The group of each block: its log or, if there are few logs, a part of it.
     pub groups: Vec<usize>,
-    /// What is known of each value without its group, as a share of the information of all.
+    /// The share of the information on each value that is taken to be known without its group.
     kept_information: f64,
 }
 
 impl Folds {
     pub fn of(problem: &Problem<'_>) -> Self {
         let shooting = &problem.shooting;
-        let stretches = blocks(shooting);
-        let count = stretches.last().map_or(0, |last| last + 1);
+        let blocks = blocks(shooting);
+        let count = blocks.last().map_or(0, |last| last + 1);
         let mut log_of = vec![0; count];
-        for (window, &stretch) in shooting.windows.iter().zip(&stretches) {
-            log_of[stretch] = window.log;
+        for (window, &block) in shooting.windows.iter().zip(&blocks) {
+            log_of[block] = window.log;
         }
         let logs = shooting.logs.len();
         let parts = problem.settings.select.fewest_groups.div_ceil(logs);
-        // What is left out together is connected: a model is to hold for motion that it was not fitted to.
-        let group = |(stretch, &log): (usize, &usize)| {
+        // Groups are contiguous: a model must hold for motion that it was not fitted to.
+        let group = |(block, &log): (usize, &usize)| {
             let first = log_of.partition_point(|of| *of < log);
             let own = log_of.partition_point(|of| *of <= log) - first;
-            log * parts + (stretch - first) * parts / own
+            log * parts + (block - first) * parts / own
         };
         let groups = log_of.iter().enumerate().map(group).collect();
         Self {
-            stretches,
+            blocks,
             groups,
             kept_information: problem.settings.select.kept_information,
         }
     }
 
-    /// The same stretches, each left out alone.
+    /// These blocks, each left out alone.
     pub fn alone(mut self) -> Self {
         self.groups = (0..self.groups.len()).collect();
         self
     }
 
-    /// The same stretches, of which every second one is left out together with all others like it.
+    /// These blocks in two groups, odd and even.
     pub fn in_halves(mut self) -> Self {
-        let stretches = self.groups.len();
-        self.groups = (0..stretches).map(|stretch| stretch % 2).collect();
+        let blocks = self.groups.len();
+        self.groups = (0..blocks).map(|block| block % 2).collect();
         self
     }
 
@@ -56,39 +57,39 @@ impl Folds {
         self.groups.iter().max().map_or(0, |last| last + 1)
     }
 
-    /// Normal equations of each stretch and of each group.
+    /// Normal equations of each block and of each group.
     pub fn equations(&self, fit: &Fit) -> (Vec<WindowTerms>, Vec<WindowTerms>) {
-        let stretches = fit.equations_by(&self.stretches);
+        let blocks = fit.equations_by(&self.blocks);
         let mut groups = vec![fit.zero_equations(); self.count()];
-        for (part, &group) in stretches.iter().zip(&self.groups) {
+        for (part, &group) in blocks.iter().zip(&self.groups) {
             groups[group].cost += part.cost;
             groups[group].gradient += &part.gradient;
             groups[group].hessian += &part.hessian;
         }
-        (stretches, groups)
+        (blocks, groups)
     }
 }
 
-/// The loss on each stretch of a problem's windows, with the parameters that a fit without the stretch's group would give.
-/// The fit is not repeated: each window's loss is taken as quadratic around the joint optimum, where leaving out a group
-/// moves the parameters by (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps the values that it has of its own, since
-/// no other log determines them.
+/// The loss on each block of a problem's windows, with the parameters that a fit without the block's group would give.
+/// The fit is not repeated: each window's loss is taken as quadratic around the joint optimum, where leaving out a
+/// group moves the parameters by (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps its per-log values, since no
+/// other log determines them.
 pub fn left_out_losses(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
     losses_by(&Folds::of(problem), fit)
 }
 
-/// The same with given folds.
+/// As [`left_out_losses`], with given folds.
 pub fn losses_by(folds: &Folds, fit: &Fit) -> Vec<f64> {
     let steps = steps_without(folds, fit);
-    let stretches = fit.equations_by(&folds.stretches);
+    let blocks = fit.equations_by(&folds.blocks);
     let loss = |(part, &group): (&WindowTerms, &usize)| {
         predicted(part.cost, &part.gradient, &part.hessian, &steps[group])
     };
-    stretches.iter().zip(&folds.groups).map(loss).collect()
+    blocks.iter().zip(&folds.groups).map(loss).collect()
 }
 
-/// The loss after a step, taken as quadratic. Sums of squares are never negative: what falls far below zero is rounding, from
-/// a step along a value that nothing determines, and no loss is known there.
+/// The loss after a step, taken as quadratic. Sums of squares are never negative: a loss far below zero is rounding,
+/// from a step along an undetermined value, and is unknown.
 pub fn predicted(
     cost: f64,
     gradient: &DVector<f64>,
@@ -103,25 +104,25 @@ pub fn predicted(
     }
 }
 
-/// For each group, the step of a fit's values when it is left out.
+/// For each group, the step of a fit's values when the group is left out.
 pub fn steps_without(folds: &Folds, fit: &Fit) -> Vec<DVector<f64>> {
     let (_, groups) = folds.equations(fit);
     let all = fit.equations_and_prior();
     let step = |part: &WindowTerms| {
-        // At a bound the gradients do not sum to zero; what the bound carries must not move the rest.
+        // At a bound the gradients do not sum to zero; the bound's part must not move the rest.
         let own = &part.gradient - &all.gradient * share(&part.hessian, &all.hessian);
         step_without(&all.hessian, &part.hessian, &own, folds.kept_information)
     };
     groups.iter().map(step).collect()
 }
 
-/// The part of the information that one group holds.
+/// The share of the information that one group holds.
 fn share(part: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
     part.trace() / all.trace().max(f64::MIN_POSITIVE)
 }
 
-/// The step of the free values when a part of the windows, with this gradient where they stand, is left out of a fit.
-/// Directions of which little more than `kept_information` is known otherwise, as a share of all, hardly move.
+/// The step of the free values when a part of the windows, with this gradient at the fit, is left out. Directions on
+/// which the other windows hold little more than the share `kept_information` of all information hardly move.
 pub fn step_without(
     all: &DMatrix<f64>,
     part: &DMatrix<f64>,

@@ -2,22 +2,22 @@ use crate::closeloop::problem::Problem;
 use crate::data::Joint;
 use crate::model::FittedEffect;
 
-/// Identifies an effect among those of a search. A ripple of another number of periods is another effect.
+/// Identifies an effect within a search. A ripple with another number of periods is another effect.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EffectId {
     kind: Kind,
     joint: Joint,
-    /// The bits of its whole numbers.
+    /// The bits of the whole-number values.
     whole: Vec<u64>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 enum Kind {
-    /// By its place in the library.
+    /// By its index in the library.
     OfLibrary(usize),
-    /// One that the model file carries and the library has not, by its place in the file.
+    /// In the model file but not in the library, by its index in the file.
     OfFile(usize),
-    /// The shift of a declared parameter, by that one's place.
+    /// The shift of a declared parameter, by the parameter's index.
     Shift(usize),
 }
 
@@ -25,7 +25,7 @@ impl Problem<'_> {
     /// Identifies an effect that a search may try.
     ///
     /// # Panics
-    /// On an effect that neither the library nor the model file has: no search tries one.
+    /// If neither the library nor the model file has the effect: no search tries such an effect.
     pub(super) fn id(&self, effect: &FittedEffect) -> EffectId {
         let name = &effect.effect.name;
         let of_library = || self.effects().iter().position(|known| known.name == *name);

@@ -2,15 +2,15 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::folds::{Folds, losses_by, steps_without};
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::closeloop::space::Space;
 use crate::data::Joint;
 use crate::identify::{Values, Window, huber};
 use crate::model::FittedEffect;
 
-/// The losses of a model on stretches left out of its fit: `[stretch * parts + part]`, where in a motion all joints are one
-/// part, since each moves the others, and of torques each joint is one. What an effect on one of many joints is worth shows on
+/// The losses of a model on blocks left out of its fit: `[block * parts + part]`. For motion all joints are one part,
+/// since each moves the others; for torques each joint is a part. The gain of an effect on one of many joints shows on
 /// that joint.
 #[derive(Debug, Clone)]
 pub struct Losses {
@@ -19,17 +19,19 @@ pub struct Losses {
 }
 
 impl Losses {
-    /// On stretches that are left out in the problem's folds.
+    /// On blocks left out in the problem's folds.
     pub fn of(problem: &Problem<'_>, fitted: &Fitted) -> Self {
         Self::by(problem, &Folds::of(problem), fitted)
     }
 
-    /// The same with given folds.
+    /// As [`Losses::of`], with given folds.
     pub fn by(problem: &Problem<'_>, folds: &Folds, fitted: &Fitted) -> Self {
         let parts = problem.parts();
-        let values = match problem.space {
-            Space::Motion => losses_by(folds, &fitted.fit),
-            Space::Torque => of_torques(problem, folds, fitted, |r| huber(r / fitted.fit.scale)),
+        let values = match problem.error_model {
+            ErrorModel::OutputError => losses_by(folds, &fitted.fit),
+            ErrorModel::InverseDynamics => {
+                of_torques(problem, folds, fitted, |r| huber(r / fitted.fit.scale))
+            }
         };
         Self { parts, values }
     }
@@ -38,12 +40,12 @@ impl Losses {
         self.values.iter().sum()
     }
 
-    /// Of the part that a joint belongs to, one a stretch.
+    /// The losses of the part that a joint belongs to, one a block.
     pub fn of_joint(&self, joint: Joint) -> Vec<f64> {
         self.of_parts(&[joint.index().min(self.parts - 1)])
     }
 
-    /// Of the parts that an effect acts on, one a stretch.
+    /// The losses of the parts that an effect acts on, one a block.
     pub fn of_effect(&self, effect: &FittedEffect) -> Vec<f64> {
         let joints = effect.joints().into_iter();
         let mut parts: Vec<usize> = joints.map(|j| j.index().min(self.parts - 1)).collect();
@@ -52,15 +54,15 @@ impl Losses {
     }
 
     fn of_parts(&self, parts: &[usize]) -> Vec<f64> {
-        let stretches = self.values.chunks(self.parts);
-        stretches
+        let blocks = self.values.chunks(self.parts);
+        blocks
             .map(|of_stretch| parts.iter().map(|part| of_stretch[*part]).sum())
             .collect()
     }
 }
 
-/// A loss of the residuals of torques, summed over each stretch and joint, `[stretch * joints + joint]`, with the values that
-/// the linearised fit without the stretch's group gives.
+/// A loss of the torque residuals, summed over each block and joint, `[block * joints + joint]`, with the values that
+/// the linearised fit without the block's group gives.
 pub fn of_torques(
     problem: &Problem<'_>,
     folds: &Folds,
@@ -72,12 +74,12 @@ pub fn of_torques(
     let values = Values::of(&dynamics, problem.logs);
     let of_group = |(group, step): (usize, &DVector<f64>)| {
         let values = values.moved(&dynamics, &fit.columns, step);
-        let all = problem.shooting.windows.iter().zip(&folds.stretches);
-        let own = all.filter(|(_, stretch)| folds.groups[**stretch] == group);
-        let (windows, stretches): (Vec<Window>, Vec<usize>) = own.unzip();
+        let all = problem.shooting.windows.iter().zip(&folds.blocks);
+        let own = all.filter(|(_, block)| folds.groups[**block] == group);
+        let (windows, blocks): (Vec<Window>, Vec<usize>) = own.unzip();
         let shooting = problem.shooting.over(windows);
-        let residuals = shooting.residuals(&dynamics, &values, &shooting.initial_locals(0));
-        let of_window = |(residuals, stretch): (Vec<f64>, usize)| {
+        let residuals = shooting.residuals(&dynamics, &values, &shooting.initial_start_states(0));
+        let of_window = |(residuals, block): (Vec<f64>, usize)| {
             let sum = |j: usize| {
                 residuals
                     .iter()
@@ -87,16 +89,16 @@ pub fn of_torques(
                     .sum()
             };
             let losses: Vec<f64> = (0..joints).map(sum).collect();
-            (stretch, losses)
+            (block, losses)
         };
-        let windows = residuals.into_iter().zip(stretches);
+        let windows = residuals.into_iter().zip(blocks);
         windows.map(of_window).collect::<Vec<_>>()
     };
     let steps = steps_without(folds, fit);
     let groups: Vec<_> = steps.par_iter().enumerate().map(of_group).collect();
     let mut sums = vec![0.0; folds.groups.len() * joints];
-    for (stretch, losses) in groups.into_iter().flatten() {
-        let own = &mut sums[stretch * joints..][..joints];
+    for (block, losses) in groups.into_iter().flatten() {
+        let own = &mut sums[block * joints..][..joints];
         own.iter_mut()
             .zip(losses)
             .for_each(|(sum, loss)| *sum += loss);

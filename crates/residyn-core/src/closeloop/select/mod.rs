@@ -1,16 +1,16 @@
 //! Stage 4: choose the set of effects that explains the logs best.
 
-mod ahead;
-mod blocks;
+mod baseline;
 mod candidate;
 mod evidence;
 mod exchange;
 mod folds;
 mod identity;
 mod losses;
-mod outlook;
+mod open_loop_check;
 mod rivals;
 mod screen;
+mod screening;
 mod search;
 mod sets;
 mod simpler;
@@ -18,9 +18,9 @@ mod simpler;
 mod tests;
 mod trial;
 
-pub(super) use self::blocks::usual_friction;
+pub(super) use self::baseline::baseline_friction;
 pub use self::candidate::candidates;
-pub(super) use self::candidate::{acting, best_start, is_of_too_many, promise, starts};
+pub(super) use self::candidate::{acting, best_start, is_of_too_many, screened_cost, starts};
 pub(super) use self::evidence::{gain, p_of_gains, p_value};
 pub(super) use self::folds::{Folds, left_out_losses};
 pub(super) use self::losses::Losses;

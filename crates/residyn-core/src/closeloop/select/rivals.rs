@@ -2,7 +2,7 @@ use rayon::prelude::*;
 
 use super::candidate::candidates;
 use super::evidence::gain;
-use super::outlook::Outlook;
+use super::screening::Screening;
 use super::trial::{Trial, differences};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
@@ -17,7 +17,7 @@ pub struct Rival {
     pub fitted: Fitted,
     pub effect: FittedEffect,
     pub instead_of: FittedEffect,
-    /// Fall of the left-out loss by either, beside the other effects.
+    /// Fall of the left-out loss by the rival, next to the other effects; then by the chosen effect.
     pub gain: f64,
     pub gain_of_chosen: f64,
 }
@@ -29,8 +29,8 @@ impl Rival {
     }
 }
 
-/// Effects that explain the logs as well as one of the chosen ones does, beside the others; `without` gives the model
-/// refitted without each of them, `of` which of them are asked for.
+/// Effects that explain the logs as well in place of one of the chosen effects; `without` holds the model refitted
+/// without each chosen effect, `of` says for which of them rivals are wanted.
 pub fn rivals(
     problem: &Problem<'_>,
     chosen: &Trial,
@@ -39,34 +39,38 @@ pub fn rivals(
 ) -> Vec<Rival> {
     let added = problem.added(&chosen.fitted.model);
     let all = candidates(problem, &chosen.fitted.model.effects);
-    let Some(outlook) = Outlook::of(problem, &chosen.fitted, &all) else {
+    let Some(screening) = Screening::of(problem, &chosen.fitted, &all) else {
         return Vec::new();
     };
     let of_effect = |(k, less): (usize, &Result<Trial, FitError>)| {
         let less = less.as_ref().ok().filter(|_| of[k])?;
-        Some(instead_of(problem, chosen, less, &outlook, k))
+        Some(instead_of(problem, chosen, less, &screening, k))
     };
     let places = (0..added.len()).into_par_iter();
     let rivals: Vec<Vec<Rival>> = places.zip(without).filter_map(of_effect).collect();
     rivals.concat()
 }
 
-/// Effects that do as well as the k-th of those that were added, which `less` is without.
+/// Effects that do as well as the k-th added effect, which `less` lacks.
 fn instead_of(
     problem: &Problem<'_>,
     chosen: &Trial,
     less: &Trial,
-    outlook: &Outlook,
+    screening: &Screening,
     k: usize,
 ) -> Vec<Rival> {
     let settings = &problem.settings.select;
     let declared = problem.declared.effects.len();
     let present = &chosen.fitted.model.effects[declared + k];
-    let others: Vec<usize> = outlook.present().into_iter().filter(|i| *i != k).collect();
-    let mut options: Vec<(f64, &FittedEffect)> = (outlook.present().len()..outlook.items.len())
+    let others: Vec<usize> = screening
+        .present()
+        .into_iter()
+        .filter(|i| *i != k)
+        .collect();
+    let mut options: Vec<(f64, &FittedEffect)> = (screening.present().len()..screening.items.len())
         .filter_map(|item| {
             let set = [others.as_slice(), &[item]].concat();
-            Some((outlook.losses(&set)?.iter().sum(), &outlook.items[item]))
+            Some((screening.losses(&set)?.iter().sum(), &screening.items[item]))
         })
         .collect();
     options.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -95,7 +99,7 @@ fn instead_of(
     options.iter().filter_map(rival).collect()
 }
 
-/// Whether the losses of an effect's joints on left-out stretches do not tell a set from the chosen one; `less` is without either
+/// Whether the left-out losses on an effect's joints do not distinguish a set from the chosen one; `less` has neither
 /// effect.
 fn is_as_good(
     [trial, chosen, less]: [&Trial; 3],

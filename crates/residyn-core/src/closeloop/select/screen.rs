@@ -1,22 +1,22 @@
 use super::candidate::{beside, best_start, has_switch};
-use super::outlook::Outlook;
-use super::sets::promising;
+use super::screening::Screening;
+use super::sets::best_predicted;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::model::FittedEffect;
 
-/// The sets of effects that promise to lower the loss of a fitted model most, the most promising first, each beyond the declared
-/// effects. All candidates are linearised at once, and sets are compared without a fit; what no value switches off comes last, alone
-/// beside the effects of the model, since it cannot be compared so.
+/// The sets of effects with the largest predicted fall of a fitted model's loss, the best first, each beyond the
+/// declared effects. All candidates are linearised at once, and sets are compared without a fit. Effects that no value
+/// switches off cannot be compared this way and come last, each alone added to the effects of the model.
 pub fn screen(
     problem: &Problem<'_>,
     fitted: &Fitted,
     candidates: &[FittedEffect],
 ) -> Vec<Vec<FittedEffect>> {
     let mut sets = Vec::new();
-    if let Some(outlook) = Outlook::of(problem, fitted, candidates) {
-        let promising = promising(&outlook, problem);
-        sets = promising.iter().map(|set| outlook.effects(set)).collect();
+    if let Some(screening) = Screening::of(problem, fitted, candidates) {
+        let predicted = best_predicted(&screening, problem);
+        sets = predicted.iter().map(|set| screening.effects(set)).collect();
     }
     let declared = problem.declared.effects.len();
     let alone = |candidate: &FittedEffect| {

@@ -3,15 +3,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::ahead::Ahead;
-use super::blocks::blocks;
+use super::baseline::baseline_sets;
 use super::candidate::candidates;
 use super::exchange::{Exchange, exchanges};
 use super::identity::EffectId;
-use super::outlook::Outlook;
+use super::open_loop_check::OpenLoopCheck;
 use super::screen::screen;
+use super::screening::Screening;
 use super::sets::descent;
-use super::simpler::{mended, simpler};
+use super::simpler::{repaired, simpler};
 use super::trial::Trial;
 use crate::closeloop::fit::Declared;
 use crate::closeloop::fitted::Fitted;
@@ -23,7 +23,7 @@ use crate::model::FittedEffect;
 /// One round of the search: the sets of effects that were fitted, best first.
 #[derive(Debug, Clone)]
 pub struct Round {
-    /// Number of candidates beside the effects of the model that the round began with.
+    /// Number of candidates that the model at the start of the round lacks.
     pub candidates: usize,
     pub tried: Vec<Tried>,
 }
@@ -32,7 +32,7 @@ pub struct Round {
 #[derive(Debug, Clone)]
 pub struct Tried {
     pub effects: Vec<FittedEffect>,
-    /// Fall of the loss on left-out stretches from that of the model which the round began with, as a share.
+    /// Fall of the loss on left-out blocks, as a share of the loss of the model that the round began with.
     pub gain: f64,
     /// Whether the next round begins with it.
     pub chosen: bool,
@@ -44,12 +44,12 @@ struct Search<'a> {
     watch: &'a dyn Watch,
     rounds: Vec<Round>,
     /// Exchanges that made the set worse since a round changed it: the old and the new effect.
-    vain: HashSet<[EffectId; 2]>,
-    /// What is being done, as it was told last.
+    rejected: HashSet<[EffectId; 2]>,
+    /// The current activity, as last reported.
     doing: String,
 }
 
-/// A set that is better than what its round began with, and its rank among the sets of the round.
+/// A set that is better than the one that its round began with, and its rank in the round.
 struct Better {
     round: usize,
     rank: usize,
@@ -58,21 +58,22 @@ struct Better {
 
 /// The set of effects that a search ended with.
 pub struct Selected {
-    /// The model with them, or why it could not be fitted.
+    /// The model with the set, or why it could not be fitted.
     pub(in crate::closeloop) chosen: Result<Trial, FitError>,
     pub rounds: Vec<Round>,
-    /// Whether the search was stopped where it stood.
+    /// Whether the search was stopped early.
     pub stopped: bool,
 }
 
-/// The simplest of the sets of effects that lower the loss on left-out stretches most, beside the declared model as it was fitted.
+/// The simplest of the sets of effects that, added to the fitted declared model, lower the loss on left-out blocks
+/// most.
 pub fn select(problem: &Problem<'_>, declared: &Fitted, watch: &dyn Watch) -> Selected {
     let mut search = Search::new(problem, watch);
     let chosen = search.select(declared.clone());
     search.end(chosen)
 }
 
-/// The same, where the search begins over short windows, from a fit of the declared model there.
+/// As [`select`], with a search that begins over short windows, from a fit of the declared model there.
 pub fn select_from(problem: &Problem<'_>, short: &Declared<'_>, watch: &dyn Watch) -> Selected {
     let mut search = Search::new(problem, watch);
     let chosen = search.select_from(short);
@@ -85,7 +86,7 @@ impl<'a> Search<'a> {
             problem,
             watch,
             rounds: Vec::new(),
-            vain: HashSet::new(),
+            rejected: HashSet::new(),
             doing: Stage::Select.text().into(),
         }
     }
@@ -99,7 +100,7 @@ impl<'a> Search<'a> {
     }
 
     /// # Errors
-    /// A selected model that cannot be fitted again.
+    /// If the selected model cannot be fitted again.
     fn select(&mut self, declared: Fitted) -> Result<Trial, FitError> {
         let problem = self.problem;
         let declared = Trial::of(problem, declared);
@@ -111,20 +112,21 @@ impl<'a> Search<'a> {
     }
 
     /// # Errors
-    /// A model found over short windows that cannot be fitted over longer ones, or a selected one that cannot be fitted again.
+    /// If the model found over short windows cannot be fitted over longer ones, or the selected model cannot be fitted
+    /// again.
     fn select_from(&mut self, short: &Declared<'_>) -> Result<Trial, FitError> {
         let problem = self.problem;
         let mut search = Search::new(&short.problem, self.watch);
         let first = search.first(Trial::of(&short.problem, short.fitted.clone()));
         let best = search.rounds_from(first)?;
         self.rounds = search.rounds;
-        let locals = problem.shooting.initial_locals(0);
-        let fitted = problem.refit(&best.fitted.model, locals, None)?;
+        let start_states = problem.shooting.initial_start_states(0);
+        let fitted = problem.refit(&best.fitted.model, start_states, None)?;
         let best = self.rounds_from(Trial::of(problem, fitted))?;
         self.simplest(&best)
     }
 
-    /// Add effects and exchange them, round by round, as long as each is better than the last.
+    /// Add and exchange effects, round by round, as long as each round is better than the last.
     fn rounds_from(&mut self, mut best: Trial) -> Result<Trial, FitError> {
         let problem = self.problem;
         let mut passed = vec![best.key()];
@@ -144,38 +146,38 @@ impl<'a> Search<'a> {
         Ok(best)
     }
 
-    /// The best set with effects added or, where that is not a large gain, with one exchanged: what is missing beside a
-    /// wrong effect may be little more than that effect's error.
+    /// The best set with effects added or, if the gain is not large, with one exchanged: an effect added to a wrong one
+    /// may do little more than correct that effect's error.
     fn next(&mut self, best: &Trial) -> Option<Trial> {
         let settings = &self.problem.settings.select;
         let added = self.better(best, settings.round_gain, Self::round);
         let is_large =
             |better: &Better| better.trial.loss() < best.loss() * (1.0 - settings.large_gain);
         if added.as_ref().is_some_and(is_large) {
-            self.vain.clear();
+            self.rejected.clear();
             return added.map(|added| self.choose(added));
         }
         // An exchange adds nothing, so it goes first, and a smaller gain will do.
         if let Some(exchanged) = self.better(best, settings.exchange_gain, Self::exchanged) {
             return Some(self.choose(exchanged));
         }
-        self.vain.clear();
+        self.rejected.clear();
         added.map(|added| self.choose(added))
     }
 
-    /// A trial at a scale of its own: the residuals have fallen, and smaller effects show. It stays at the one it has where no
-    /// loss is known at the new one. An effect whose values have moved to a bound gives way to what it contains: no set with
-    /// it would be valid from then on.
+    /// A trial with its scale estimated anew: the residuals have fallen, and smaller effects show. It keeps its present
+    /// scale if the loss at the new one is unknown. An effect whose values have moved to a bound is replaced by the
+    /// effects that it contains: no set with it would be valid from then on.
     fn estimated(&self, trial: Trial) -> Result<Trial, FitError> {
         let anew = Trial::of(self.problem, self.problem.estimate(&trial.fitted)?);
         let anew = if anew.loss().is_finite() { anew } else { trial };
-        match self.mended_from(&anew, f64::INFINITY) {
+        match self.repaired_from(&anew, f64::INFINITY) {
             Some(simpler) => self.estimated(simpler),
             None => Ok(anew),
         }
     }
 
-    /// The best of a round that is better than what the round began with by this share of the loss, and not worse in its
+    /// The best set of a round that lowers the loss of the round's start by this share and does not worsen the
     /// open-loop error.
     fn better(
         &mut self,
@@ -188,10 +190,10 @@ impl<'a> Search<'a> {
         let better = (trials.into_iter().enumerate()).take_while(|(_, t)| t.loss() < enough);
         let mut better = better.peekable();
         better.peek()?;
-        let ahead = Ahead::of(self.problem, from);
+        let ahead = OpenLoopCheck::of(self.problem, from);
         let (rank, trial) = better.find(|(_, trial)| {
             let settings = &self.problem.settings.select;
-            !Ahead::of(self.problem, trial).is_worse_than(&ahead, settings)
+            !OpenLoopCheck::of(self.problem, trial).is_worse_than(&ahead, settings)
         })?;
         let round = self.rounds.len() - 1;
         Some(Better { round, rank, trial })
@@ -208,21 +210,21 @@ impl<'a> Search<'a> {
         self.watch.see(Progress::within(Stage::Select, text));
     }
 
-    /// Report that so many of the sets of effects are fitted.
-    fn tell_fitted(&self, done: usize, of: usize) {
+    /// Report how many of the sets of effects are fitted.
+    fn report_fitted(&self, done: usize, of: usize) {
         let fits = Some(Fits { done, of });
         let doing = Progress::within(Stage::Select, &self.doing);
         self.watch.see(Progress { fits, ..doing });
     }
 
-    /// The declared model or, where it helps, the model with what most machines have.
+    /// The declared model or, if it helps, the model with the baseline effects.
     fn first(&mut self, declared: Trial) -> Trial {
         let problem = self.problem;
         let step = problem.settings.select.round_gain;
         let best = self.better(&declared, step, |search, declared| {
             search.say("fitting what most machines have");
-            let blocks = blocks(problem);
-            let fitted = search.fitted_for_the_best(declared, blocks);
+            let baseline = baseline_sets(problem);
+            let fitted = search.fitted_for_the_best(declared, baseline);
             search.noted(declared, fitted, 0)
         });
         let best = best.map(|best| self.choose(best));
@@ -232,7 +234,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Fit the sets that promise most beside a model, the best first.
+    /// Fit the sets with the largest predicted gain over a model, and return them best first.
     fn round(&mut self, from: &Trial) -> Vec<Trial> {
         let candidates = candidates(self.problem, &from.fitted.model.effects);
         self.say(&format!("screening {} effects", candidates.len()));
@@ -242,8 +244,8 @@ impl<'a> Search<'a> {
         self.noted(from, fitted, candidates.len())
     }
 
-    /// The declared model with each set of effects in place of those of a trial, the most promising first, fitted at its
-    /// scale, to find the best one: those that cannot be better than the trial or the first few are left out.
+    /// The declared model with each set of effects in place of a trial's, the most promising first, fitted at the
+    /// trial's scale to find the best one: sets that cannot be better than the trial or the first few are left out.
     fn fitted_for_the_best(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
         let first = self
             .problem
@@ -258,9 +260,9 @@ impl<'a> Search<'a> {
         trials
     }
 
-    /// The declared model with each set of effects in place of those of a trial, fitted at its scale; those that cannot
-    /// be fitted, or leave more than a loss of `below`, are left out. No loss on stretches left out is smaller than that
-    /// of the fit itself. An effect whose values stand at a bound gives way to what it contains.
+    /// The declared model with each set of effects in place of a trial's, fitted at the trial's scale; sets that cannot
+    /// be fitted, or leave a loss above `below`, are left out. The loss on left-out blocks is never smaller than that
+    /// of the fit itself. An effect with values at a bound is replaced by the effects that it contains.
     fn fitted(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>, below: f64) -> Vec<Trial> {
         let problem = self.problem;
         sets.iter_mut().for_each(without_contained);
@@ -274,25 +276,25 @@ impl<'a> Search<'a> {
             if found.is_valid(problem) {
                 return Some(found);
             }
-            self.mended_from(&found, below)
+            self.repaired_from(&found, below)
         };
         let (of, done) = (sets.len(), AtomicUsize::new(0));
-        self.tell_fitted(0, of);
+        self.report_fitted(0, of);
         let tell =
-            |_: &Option<Trial>| self.tell_fitted(done.fetch_add(1, Ordering::Relaxed) + 1, of);
+            |_: &Option<Trial>| self.report_fitted(done.fetch_add(1, Ordering::Relaxed) + 1, of);
         let tried = sets.into_par_iter().map(trial).inspect(tell);
         let mut trials: Vec<Trial> = tried.flatten().collect();
         first_of_each(&mut trials, Vec::new(), Trial::key);
         trials
     }
 
-    /// Fit the sets in which one effect is exchanged for another like it, the best first. What was in vain once is not
-    /// tried again.
+    /// Fit the sets in which one effect is exchanged for a similar one, and return them best first. A rejected exchange
+    /// is not tried again.
     fn exchanged(&mut self, from: &Trial) -> Vec<Trial> {
         self.say("exchanging effects");
         let problem = self.problem;
         let mut exchanges = exchanges(problem, &from.fitted);
-        exchanges.retain(|exchange| !self.vain.contains(&exchange.pair));
+        exchanges.retain(|exchange| !self.rejected.contains(&exchange.pair));
         if exchanges.is_empty() {
             return Vec::new();
         }
@@ -300,13 +302,14 @@ impl<'a> Search<'a> {
         let fitted = self.fitted(from, sets.collect(), from.loss());
         let better = fitted.iter().filter(|trial| trial.loss() < from.loss());
         let better: Vec<Vec<EffectId>> = better.map(|trial| trial.added_key(problem)).collect();
-        let is_vain = |exchange: &Exchange| !better.contains(&problem.key(&exchange.set));
-        let vain = exchanges.iter().filter(|exchange| is_vain(exchange));
-        self.vain.extend(vain.map(|exchange| exchange.pair.clone()));
+        let is_rejected = |exchange: &Exchange| !better.contains(&problem.key(&exchange.set));
+        let rejected = exchanges.iter().filter(|exchange| is_rejected(exchange));
+        self.rejected
+            .extend(rejected.map(|exchange| exchange.pair.clone()));
         self.noted(from, fitted, exchanges.len())
     }
 
-    /// Note a round, and return its trials, the best first.
+    /// Record a round, and return its trials, the best first.
     fn noted(&mut self, from: &Trial, mut trials: Vec<Trial>, candidates: usize) -> Vec<Trial> {
         trials.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
         let gain = |trial: &Trial| 1.0 - trial.loss() / from.loss().max(f64::MIN_POSITIVE);
@@ -320,7 +323,7 @@ impl<'a> Search<'a> {
         trials
     }
 
-    /// Drop effects, or put simpler ones in their place, as long as the set explains the logs as well as the best one.
+    /// Drop effects, or replace them by simpler ones, as long as the set explains the logs as well as the best one.
     fn simplest(&mut self, best: &Trial) -> Result<Trial, FitError> {
         self.say("simplifying");
         let problem = self.problem;
@@ -348,7 +351,7 @@ impl<'a> Search<'a> {
             let is_simpler = |trial: &Trial| trial.values() < current.values();
             let (mut good, mut other): (Vec<_>, Vec<_>) = good.into_iter().partition(is_simpler);
             if good.is_empty() {
-                // An exchange may make others needless.
+                // An exchange may make other effects redundant.
                 other.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
                 let few = other
                     .iter()
@@ -367,26 +370,26 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The smallest set of a trial's effects that explains the logs as well as the best one, among those that predicted
-    /// losses lead to.
+    /// The smallest set of a trial's effects that explains the logs as well as the best one, among the sets that
+    /// predicted losses suggest.
     fn least(&self, trial: &Trial, best: &Trial) -> Trial {
         let problem = self.problem;
-        let Some(outlook) = Outlook::of(problem, &trial.fitted, &[]) else {
+        let Some(screening) = Screening::of(problem, &trial.fitted, &[]) else {
             return trial.clone();
         };
         let settings = &problem.settings.select;
         let within = |set: &Vec<usize>| {
-            let losses = outlook.losses(set);
+            let losses = screening.losses(set);
             let sum = losses.map_or(f64::INFINITY, |losses| losses.iter().sum());
             sum <= best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
         };
-        let all = outlook.present();
+        let all = screening.present();
         let mut unshifted = all.clone();
-        unshifted.retain(|&item| outlook.items[item].shifted().is_none());
-        let mut sets: Vec<_> = [descent(&outlook, all), vec![unshifted.clone()]].concat();
-        sets.extend(descent(&outlook, unshifted));
+        unshifted.retain(|&item| screening.items[item].shifted().is_none());
+        let mut sets: Vec<_> = [descent(&screening, all), vec![unshifted.clone()]].concat();
+        sets.extend(descent(&screening, unshifted));
         sets.retain(within);
-        let sets = sets.iter().map(|set| outlook.effects(set)).collect();
+        let sets = sets.iter().map(|set| screening.effects(set)).collect();
         let good = self.as_good_as(best, trial, sets);
         let size = |trial: &Trial| (trial.fitted.model.effects.len(), trial.shifts());
         good.into_iter()
@@ -402,8 +405,8 @@ impl<'a> Search<'a> {
         trials
     }
 
-    /// The declared model with a set of effects in place of those of a trial, fitted at its scale to a loss of `below`, if time is
-    /// left.
+    /// The declared model with a set of effects in place of a trial's, fitted at the trial's scale to a loss of
+    /// `below`, if time is left.
     fn fitted_from(&self, from: &Trial, set: &[FittedEffect], below: f64) -> Option<Trial> {
         if self.watch.has_to_end() {
             return None;
@@ -414,21 +417,21 @@ impl<'a> Search<'a> {
         Some(Trial::of(problem, fitted))
     }
 
-    /// A trial with what each effect contains in place of those whose values are not consistent, fitted from there to a loss of
-    /// `below`; `None` where all are, or where that leaves no valid set.
-    fn mended_from(&self, trial: &Trial, below: f64) -> Option<Trial> {
+    /// A trial in which the effects whose values are not consistent are replaced by those that they contain, fitted
+    /// from there to a loss of `below`; `None` if all are consistent, or if no valid set results.
+    fn repaired_from(&self, trial: &Trial, below: f64) -> Option<Trial> {
         let problem = self.problem;
         if trial.is_consistent(problem) {
             return None;
         }
         let declared = &problem.declared.effects;
-        let set = mended(problem.effects(), declared, trial.added(problem));
+        let set = repaired(problem.effects(), declared, trial.added(problem));
         let found = self.fitted_from(trial, &set, below);
         found.filter(|found| found.is_valid(problem))
     }
 }
 
-/// Drop those whose key has been met: among `met`, or among those before them.
+/// Drop items whose key is in `met` or belongs to an earlier item.
 fn first_of_each<T>(
     items: &mut Vec<T>,
     mut met: Vec<Vec<EffectId>>,
@@ -442,7 +445,7 @@ fn first_of_each<T>(
     });
 }
 
-/// Drop effects that another one of the set contains.
+/// Drop effects that another effect of the set contains.
 fn without_contained(set: &mut Vec<FittedEffect>) {
     let all = set.clone();
     set.retain(|part| !all.iter().any(|whole| whole.contains(part)));

@@ -2,17 +2,17 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use super::outlook::{Outlook, Set};
+use super::screening::{Screening, Set};
 use crate::closeloop::problem::Problem;
 
-/// Sets of an outlook's items that promise to lower the loss on left-out stretches, found by a beam search: from the
-/// items of the model, one is added or dropped at a time, and the best few sets of a step lead to the next.
-pub fn promising(outlook: &Outlook, problem: &Problem<'_>) -> Vec<Set> {
+/// Sets of a screening's items that are predicted to lower the loss on left-out blocks, found by a beam search: from
+/// the items of the model, one item is added or dropped at a time, and the best few sets of each step start the next.
+pub fn best_predicted(screening: &Screening, problem: &Problem<'_>) -> Vec<Set> {
     let settings = &problem.settings.select;
     let most = settings.most_effects_of(problem.declared.joints);
     let step = problem.of_whole(settings.round_gain);
-    let start = outlook.present();
-    let total = |set: &Set| Some(outlook.losses(set)?.iter().sum::<f64>());
+    let start = screening.present();
+    let total = |set: &Set| Some(screening.losses(set)?.iter().sum::<f64>());
     let Some(first) = total(&start) else {
         return Vec::new();
     };
@@ -23,7 +23,7 @@ pub fn promising(outlook: &Outlook, problem: &Problem<'_>) -> Vec<Set> {
     for _ in 0..settings.beam_steps {
         let mut next: Vec<Set> = beam
             .iter()
-            .flat_map(|set| neighbours(outlook, set, most))
+            .flat_map(|set| neighbours(screening, set, most))
             .collect();
         next.retain(|set| seen.insert(set.clone()));
         let mut scored: Vec<(f64, Set)> = next
@@ -43,9 +43,9 @@ pub fn promising(outlook: &Outlook, problem: &Problem<'_>) -> Vec<Set> {
     shortlist(ranked, settings.fitted_sets)
 }
 
-/// Sets with one item more or less; an item takes the place of those that it contains.
-fn neighbours(outlook: &Outlook, set: &Set, most: usize) -> Vec<Set> {
-    let items = &outlook.items;
+/// Sets with one item more or less; an added item replaces those that it contains.
+fn neighbours(screening: &Screening, set: &Set, most: usize) -> Vec<Set> {
+    let items = &screening.items;
     let contains = |whole: usize, part: usize| items[whole].contains(&items[part]);
     let toggled = |item: usize| {
         let mut other = set.clone();
@@ -66,16 +66,16 @@ fn neighbours(outlook: &Outlook, set: &Set, most: usize) -> Vec<Set> {
     all.filter(|set| set.len() <= most).collect()
 }
 
-/// Sets with ever fewer of some items, each the best by predicted loss on left-out stretches with one item less than the
-/// one before.
-pub fn descent(outlook: &Outlook, from: Set) -> Vec<Set> {
+/// Sets with ever fewer of some items: each drops from the one before the item that leaves the lowest predicted loss on
+/// left-out blocks.
+pub fn descent(screening: &Screening, from: Set) -> Vec<Set> {
     let mut sets = Vec::new();
     let mut current = from;
     while !current.is_empty() {
         let without = |k: usize| {
             let mut less = current.clone();
             less.remove(k);
-            Some((outlook.losses(&less)?.iter().sum::<f64>(), less))
+            Some((screening.losses(&less)?.iter().sum::<f64>(), less))
         };
         let less: Vec<(f64, Set)> = (0..current.len())
             .into_par_iter()

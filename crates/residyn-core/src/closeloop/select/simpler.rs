@@ -3,8 +3,8 @@ use std::ops::Range;
 use super::trial::is_consistent;
 use crate::model::{Effect, FittedEffect};
 
-/// Every set of effects in which one is replaced by some of those that it contains and that the set has not, fewest first. Only
-/// effects at the places `added` change.
+/// Every set in which one effect is replaced by some of the effects that it contains and the set lacks, fewest first.
+/// Only effects at the indices `added` change.
 pub(super) fn simpler(
     library: &[Effect],
     effects: &[FittedEffect],
@@ -28,14 +28,14 @@ pub(super) fn simpler(
     all
 }
 
-/// Whether an effect can act beside others: the same one twice cannot.
+/// Whether an effect can be added to others: no effect can act twice.
 fn is_free_of(new: &FittedEffect, others: &[FittedEffect]) -> bool {
     !others.iter().any(|other| other.excludes(new))
 }
 
-/// A set of effects with what it contains in place of each whose values are not consistent: all of it that the set and the
-/// declared effects have not, since the simpler ones are found from there.
-pub(super) fn mended(
+/// A set in which each effect whose values are not consistent is replaced by the effects that it contains: all that the
+/// set and the declared effects lack, since simpler sets are found from there.
+pub(super) fn repaired(
     library: &[Effect],
     declared: &[FittedEffect],
     effects: &[FittedEffect],
@@ -55,7 +55,7 @@ pub(super) fn mended(
     effects.iter().flat_map(mend).collect()
 }
 
-/// The sets of effects contained in one that take fewer parameters together, fewest first.
+/// The sets of effects contained in `whole` that have fewer parameters together, fewest first.
 fn parts_of<'l>(library: &'l [Effect], whole: &Effect) -> Vec<Vec<&'l Effect>> {
     let is_part = |effect: &&Effect| whole.contains.contains(&effect.name);
     let parts: Vec<&Effect> = library.iter().filter(is_part).collect();
@@ -74,7 +74,7 @@ fn parts_of<'l>(library: &'l [Effect], whole: &Effect) -> Vec<Vec<&'l Effect>> {
     sets
 }
 
-/// A simpler effect that another contains, at the values of the parameters that have the same names.
+/// A simpler effect that another contains, with the values of the parameters of the same names.
 fn part_of(whole: &FittedEffect, part: &Effect) -> FittedEffect {
     let mut fitted = FittedEffect::absent(part, whole.joint);
     let known = whole.effect.parameters.iter().zip(&whole.values);

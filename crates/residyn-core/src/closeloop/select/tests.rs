@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::blocks::{blocks, usual_friction};
+use super::baseline::{baseline_friction, baseline_sets};
 use super::candidate::candidates;
 use super::exchange::{Exchange, exchanges};
 use super::folds::{Folds, left_out_losses, predicted};
-use super::outlook::Outlook;
-use super::simpler::{mended, simpler};
+use super::screening::Screening;
+use super::simpler::{repaired, simpler};
 use super::trial::Trial;
 use crate::closeloop::fit::{Declared, NOTHING};
 use crate::closeloop::problem::Problem;
@@ -22,8 +22,8 @@ fn what_is_left_out_together_is_a_connected_part_of_one_log() {
     let folds = Folds::of(&problem);
     assert!(folds.groups.is_sorted(), "{:?}", folds.groups);
     let mut logs_of = std::collections::HashMap::new();
-    for (window, &stretch) in problem.shooting.windows.iter().zip(&folds.stretches) {
-        let log = logs_of.entry(folds.groups[stretch]).or_insert(window.log);
+    for (window, &block) in problem.shooting.windows.iter().zip(&folds.blocks) {
+        let log = logs_of.entry(folds.groups[block]).or_insert(window.log);
         assert_eq!(*log, window.log);
     }
     assert!(logs_of.len() >= settings.select.fewest_groups);
@@ -47,17 +47,17 @@ fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
     let problem = Problem::new(&declared, &library, &logs, &settings);
     let Declared { problem, fitted } = problem.fit_declared().unwrap();
     let all = candidates(&problem, &[]);
-    let outlook = Outlook::of(&problem, &fitted, &all).unwrap();
-    let loss = |set: &[usize]| outlook.losses(set).unwrap().iter().sum::<f64>();
+    let screening = Screening::of(&problem, &fitted, &all).unwrap();
+    let loss = |set: &[usize]| screening.losses(set).unwrap().iter().sum::<f64>();
     let known: f64 = left_out_losses(&problem, &fitted.fit).iter().sum();
     assert!((loss(&[]) / known - 1.0).abs() < 0.01);
 
-    let items = outlook.items.iter().map(FittedEffect::label);
+    let items = screening.items.iter().map(FittedEffect::label);
     let coulomb = items
         .clone()
         .position(|label| label.starts_with("coulomb"))
         .unwrap();
-    let effects = outlook.effects(&[coulomb]);
+    let effects = screening.effects(&[coulomb]);
     let with = problem.with_effects(&fitted, effects).unwrap();
     let found: f64 = left_out_losses(&problem, &with.fit).iter().sum();
     assert!(found < 0.2 * known);
@@ -68,7 +68,7 @@ fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
     );
 }
 
-/// A disc that is off its axis by its whole bound was not found there.
+/// An encoder disc whose eccentricity is at its bound was not found there.
 #[test]
 fn a_set_with_a_value_at_its_bound_is_not_valid() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
@@ -84,7 +84,7 @@ fn a_set_with_a_value_at_its_bound_is_not_valid() {
     assert!(!trial.is_valid(&problem));
 }
 
-/// A library of one's own, whatever its effects are called, says what most machines have.
+/// A user's library says what most machines have, whatever its effects are called.
 #[test]
 fn what_most_machines_have_is_said_by_effect_files() {
     let drag = |name: &str, rank: &str| {
@@ -105,12 +105,12 @@ fn what_most_machines_have_is_said_by_effect_files() {
             .map(|effect| effect.effect.name.clone())
             .collect()
     };
-    let sets: Vec<_> = blocks(&problem).iter().map(names).collect();
+    let sets: Vec<_> = baseline_sets(&problem).iter().map(names).collect();
     assert_eq!(sets, [vec!["grease"], vec!["bearing", "grease"]]);
-    assert_eq!(names(&usual_friction(&problem)), ["grease"]);
+    assert_eq!(names(&baseline_friction(&problem)), ["grease"]);
 }
 
-/// Its fastest possible velocity says that friction does not fall: it is Coulomb friction at the level found.
+/// At the largest possible Stribeck velocity, friction does not fall: it is Coulomb friction at the level found.
 #[test]
 fn an_effect_at_a_bound_gives_way_to_what_it_contains() {
     let library = Library::built_in();
@@ -118,7 +118,7 @@ fn an_effect_at_a_bound_gives_way_to_what_it_contains() {
     let fastest = stribeck.effect.parameters[2].bounds[1];
     stribeck.values = vec![(0.1, None), (0.2, None), (fastest, None)];
     let set = [absent("joint_spring"), stribeck];
-    let mended = mended(library.effects(), &[], &set);
+    let mended = repaired(library.effects(), &[], &set);
     let labels: Vec<String> = mended.iter().map(FittedEffect::label).collect();
     assert_eq!(
         labels,
@@ -127,7 +127,7 @@ fn an_effect_at_a_bound_gives_way_to_what_it_contains() {
     assert_eq!(mended[1].values[0].0, 0.1);
 }
 
-/// A gain of the torque beside a free inertia has any value.
+/// With a free inertia, a torque gain can have any value.
 #[test]
 fn a_set_whose_values_the_logs_do_not_tell_apart_is_not_valid() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
@@ -155,7 +155,7 @@ fn simpler_sets_have_fewer_parameters() {
     assert_eq!(most, parts);
 }
 
-/// The friction that a file declares is not added to it once more: no file may hold it twice.
+/// Friction that a file declares is not added again: no file may hold it twice.
 #[test]
 fn simpler_sets_hold_no_effect_twice() {
     let library = Library::built_in();
@@ -169,13 +169,13 @@ fn simpler_sets_hold_no_effect_twice() {
     let [declared, whole] = effects;
     let mut broken = whole;
     broken.values[0].0 = f64::NAN;
-    let mended = mended(library.effects(), &[declared], &[broken]);
+    let mended = repaired(library.effects(), &[declared], &[broken]);
     let names: Vec<&str> = mended.iter().map(|effect| &*effect.effect.name).collect();
     assert!(!names.contains(&"viscous_friction"), "{names:?}");
 }
 
-/// The lag takes over the value of the delay, and the ripple is tried with the number of periods that the rig has and
-/// with those next to its own.
+/// The lag takes over the value of the delay, and the ripple is tried with the number of periods of the rig and with
+/// the numbers next to its present one.
 #[test]
 fn exchanges_start_near_what_they_replace() {
     const RIG: &str = r#"

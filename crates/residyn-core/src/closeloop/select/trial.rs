@@ -1,7 +1,7 @@
 use super::evidence::gain;
 use super::identity::EffectId;
 use super::losses::Losses;
-use super::outlook::tells_apart;
+use super::screening::distinguishes;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::settings::SelectSettings;
@@ -9,14 +9,14 @@ use crate::data::Joint;
 use crate::data::statistics::{mean, standard_error};
 use crate::model::{EffectParameter, FittedEffect};
 
-/// A model with some set of effects, fitted and judged by stretches left out of the fit.
+/// A model with a set of effects, fitted and judged on blocks left out of the fit.
 #[derive(Debug, Clone)]
 pub struct Trial {
     pub fitted: Fitted,
-    /// On each stretch, with the parameters that a fit without it would give. Comparable among trials that were fitted at
-    /// the same scale.
+    /// The loss on each block, with the parameters that a fit without the block would give; comparable among trials
+    /// fitted at the same scale.
     pub losses: Losses,
-    /// Identifies its effects, in the order of the model.
+    /// Identifies the model's effects, in their order.
     ids: Vec<EffectId>,
 }
 
@@ -30,27 +30,27 @@ impl Trial {
         }
     }
 
-    /// Loss over all stretches.
+    /// Loss over all blocks.
     pub fn loss(&self) -> f64 {
         self.losses.total()
     }
 
-    /// Number of free values, then of simpler effects that the added ones contain.
+    /// Number of free values, and of simpler effects that the effects of the model contain.
     pub fn values(&self) -> (usize, usize) {
         let effects = &self.fitted.model.effects;
         let contained = effects.iter().map(|effect| effect.effect.contains.len());
         (self.fitted.fit.columns.len(), contained.sum())
     }
 
-    /// Number of parameters that are not where the file holds them: of sets that are as good, the one that contradicts the
-    /// file least is chosen.
+    /// Number of parameters shifted from the values that the file fixes: of equally good sets, the one that contradicts
+    /// the file least is chosen.
     pub fn shifts(&self) -> usize {
         let effects = self.fitted.model.effects.iter();
         effects.filter(|effect| effect.shifted().is_some()).count()
     }
 
-    /// Whether every added effect has values that are consistent with each other and that the logs tell from all others:
-    /// a value that stands at a bound was not found there, unless it is zero and the effect absent.
+    /// Whether the values of every added effect are consistent with each other and distinguished by the logs from all
+    /// others: a value at a bound was not found there, unless it is zero and the effect absent.
     pub fn is_valid(&self, problem: &Problem<'_>) -> bool {
         self.is_consistent(problem) && self.is_determined(problem)
     }
@@ -63,19 +63,19 @@ impl Trial {
         }
         let first = model.place_of(added.start).start;
         let columns = &fit.columns;
-        let told = |&i: &usize| problem.is_told(columns[i].parameter);
-        let told: Vec<usize> = (0..columns.len()).filter(told).collect();
-        let base = told.iter().filter(|&&i| columns[i].parameter < first);
+        let message = |&i: &usize| problem.is_identifiable(columns[i].parameter);
+        let message: Vec<usize> = (0..columns.len()).filter(message).collect();
+        let base = message.iter().filter(|&&i| columns[i].parameter < first);
         let information = fit.equations().hessian;
-        let information = information.select_rows(&told).select_columns(&told);
-        tells_apart(
+        let information = information.select_rows(&message).select_columns(&message);
+        distinguishes(
             &information,
             base.count(),
             problem.settings.select.own_information,
         )
     }
 
-    /// Whether the values of each added effect are consistent with each other and none stands at a bound.
+    /// Whether the values of each added effect are consistent with each other and none is at a bound.
     pub fn is_consistent(&self, problem: &Problem<'_>) -> bool {
         self.added(problem).iter().all(is_consistent)
     }
@@ -92,13 +92,13 @@ impl Trial {
         key
     }
 
-    /// The same of the effects beyond the declared ones.
+    /// As [`Trial::key`], for the effects beyond the declared ones.
     pub fn added_key(&self, problem: &Problem<'_>) -> Vec<EffectId> {
         problem.key(self.added(problem))
     }
 
-    /// Whether this simpler set explains the logs as well as the best one: its loss is no more than a little larger, and not
-    /// significantly so, altogether and on each joint where the two differ.
+    /// Whether this simpler set explains the logs as well as the best one: its loss is at most a little larger, and not
+    /// significantly so, in total and on each joint where the two differ.
     pub fn is_as_good_as(&self, best: &Self, settings: &SelectSettings) -> bool {
         let is_as_good = |own: &[f64], best: &[f64]| {
             let rise = -gain(best, own);
@@ -113,7 +113,7 @@ impl Trial {
             && self.differs_on(best).into_iter().all(on_joint)
     }
 
-    /// The joints of effects that one of two trials has and the other has not.
+    /// The joints of effects that only one of two trials has.
     fn differs_on(&self, other: &Self) -> Vec<Joint> {
         let not_in = |a: &Self, b: &Self| -> Vec<Joint> {
             let effects = a.fitted.model.effects.iter().zip(&a.ids);
@@ -124,7 +124,7 @@ impl Trial {
     }
 }
 
-/// Whether the values of an effect are consistent with each other and none stands at a bound.
+/// Whether the values of an effect are consistent with each other and none is at a bound.
 pub fn is_consistent(effect: &FittedEffect) -> bool {
     let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
     let mut shapes = effect.effect.parameters.iter().zip(&values);

@@ -16,12 +16,12 @@ pub struct Channel {
     pub max: f64,
     /// Quantisation step; 0 for a continuous channel.
     pub resolution: f64,
-    /// Standard deviation of the white noise. An upper bound where the steps are long against the
-    /// motion; 0 where quantisation hides the noise.
+    /// Standard deviation of the white noise. An upper bound if the steps are long relative to the motion; 0 if
+    /// quantisation hides the noise.
     pub noise_std: f64,
-    /// Rows that jump. For a velocity: rows that disagree with the derivative of the angle. For an
-    /// angle or a torque: single rows away from both neighbours, which agree with each other. Those of an angle are not
-    /// among the values that the other numbers are about.
+    /// Rows that jump. For a velocity: rows that disagree with the derivative of the angle. For an angle or a torque:
+    /// single rows away from both neighbours, which agree with each other. Rows in which an angle jumps are excluded
+    /// from the other numbers.
     pub spikes: usize,
     /// Share of the rows that sit at exactly the smallest or largest value, as at a limit; 0 if the
     /// values merely turn round there, or if the limit is zero.
@@ -79,7 +79,7 @@ fn saturated_rows(values: &[f64], limit: f64, range: f64, resolution: f64) -> us
     if range == 0.0 || limit.abs() <= 1e-3 * range {
         return 0;
     }
-    // One step of a quantised channel. A coarse one (bang-bang) has no neighbouring step to ask.
+    // One step of a quantised channel. A coarse one (bang-bang) has no neighbouring step to compare with.
     let near = (1.5 * resolution).clamp(0.01 * range, 0.2 * range);
     let at = values.iter().filter(|value| **value == limit).count();
     let within = values

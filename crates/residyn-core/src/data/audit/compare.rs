@@ -25,12 +25,12 @@ pub(super) const MIN_CORRELATION: f64 = 0.9;
 /// logs of one rig it scattered by several steps.
 const MIN_TORQUE_CORRELATION: f64 = 0.5;
 
-/// Where gravity, friction and the other joints explain all but this share of an acceleration, what is left is the
-/// error of that explanation and shows lags that are none: a single sine is the usual case.
+/// If gravity, friction and the other joints explain all but this share of an acceleration, the rest is the error of
+/// that regression and shows spurious lags: a single sine is the usual case.
 const MIN_UNEXPLAINED: f64 = 0.02;
 
-/// An acceleration cannot come before its torque but for the time stamps, which are off by less than
-/// this many samples. A controller's torque does trail the motion, which is not what is asked.
+/// An acceleration cannot precede its torque, except for errors of the time stamps, which are below this many samples.
+/// A controller's torque does trail the motion, but that is not the lag sought.
 const MAX_TORQUE_LEAD: isize = 2;
 
 /// The logged velocity against the derivative of the logged angle.
@@ -52,8 +52,8 @@ pub struct VelocityCheck {
 /// The acceleration against the torque that drives it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TorqueLag {
-    /// By how much the acceleration trails the torque \[s\], beyond the half step that holding a torque
-    /// over each step brings by itself.
+    /// By how much the acceleration trails the torque \[s\], beyond the half step that holding a torque over each step
+    /// adds by itself.
     pub lag_s: f64,
     /// Correlation of the two at that lag, after gravity, friction and the other joints' acceleration
     /// are taken out of both by linear regression.
@@ -63,7 +63,7 @@ pub struct TorqueLag {
 /// The speeds between which a joint moves.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Speeds {
-    /// Slower than this, it cannot be told from a joint at rest \[rad/s\].
+    /// Slower than this, it cannot be distinguished from a joint at rest \[rad/s\].
     pub rest_rad_s: f64,
     /// 95 % of the rows are slower than this \[rad/s\].
     pub fast_rad_s: f64,
@@ -93,7 +93,7 @@ pub(super) fn velocity_check(
     let (rows, pairs) = aligned_velocities(motion, lag_s);
     let scale = velocity_scale(&pairs, fast_rad_s);
     let off = |(logged, derived): &(f64, f64)| logged - scale * derived;
-    // At rest both are zero and agree to the last digit, which is no measure for rows in motion.
+    // At rest both are zero and agree to the last digit, which says nothing about rows in motion.
     let moving = pairs.iter().filter(|pair| pair.1.abs() > rest_rad_s);
     let spread = mad(&moving.map(off).collect::<Vec<_>>());
     let floor = (JUMP_MADS * spread)
@@ -111,7 +111,7 @@ pub(super) fn velocity_check(
     (Some(check), disagreeing.map(|(row, _)| *row).collect())
 }
 
-/// Correlation of the logged velocity with the negative derivative, if it is closer than that with the derivative.
+/// Correlation of the logged velocity with the negative derivative, if it is higher than the one with the derivative.
 pub(super) fn opposed_velocity(
     motion: &Motion,
     check: Option<VelocityCheck>,
@@ -125,16 +125,16 @@ pub(super) fn opposed_velocity(
 
 /// Rows, and the logged velocity of each with the derivative of the angle `lag_s` earlier.
 fn aligned_velocities(motion: &Motion, lag_s: f64) -> (Vec<usize>, Vec<(f64, f64)>) {
-    let of_stretch = |stretch: &Range<usize>| {
+    let of_stretch = |interval: &Range<usize>| {
         let (time, velocity) = (
-            &motion.time[stretch.clone()],
-            &motion.velocity[stretch.clone()],
+            &motion.time[interval.clone()],
+            &motion.velocity[interval.clone()],
         );
         let derived = move |k: usize| interpolate(time, velocity, motion.time[k] - lag_s);
         let pair = move |k: usize| Some((motion.rows[k], (motion.qd[k], derived(k)?)));
-        stretch.clone().filter_map(pair)
+        interval.clone().filter_map(pair)
     };
-    motion.stretches.iter().flat_map(of_stretch).unzip()
+    motion.intervals.iter().flat_map(of_stretch).unzip()
 }
 
 /// Ratio of logged to derived velocity: the median over the rows faster than a third of the fast
@@ -170,9 +170,9 @@ fn lag_of(motion: &Motion, velocity: &[f64], step_s: f64) -> Option<Lag> {
 
 /// Finds how the acceleration of a joint trails its torque.
 ///
-/// By itself the acceleration of a swinging joint follows gravity more than torque, and under feedback
-/// the torque follows the motion. So what is linear in the sine and cosine of the angles, in the
-/// velocities and their signs, and in the other joints' accelerations, is taken out of both first.
+/// By itself the acceleration of a swinging joint follows gravity more than torque, and under feedback the torque
+/// follows the motion. So the part that is linear in the sine and cosine of the angles, in the velocities and their
+/// signs, and in the other joints' accelerations, is removed from both first.
 ///
 /// `fast_rad_s` holds the fast speed of every joint.
 pub(super) fn torque_lag(

@@ -9,21 +9,21 @@ use crate::data::local_cubic::LocalCubic;
 use crate::data::projection::{explained_by, orthonormal};
 use crate::data::statistics::{deviation, rms};
 
-/// Rows beyond this many times what the motion needs at most count as far off.
+/// Rows beyond this many times the largest torque that the motion needs count as far off.
 const FAR_OFF: f64 = 2.0;
 
-/// Fewer rows than this for each column of the regression say nothing.
+/// A regression with fewer rows than this per column says nothing.
 const ROWS_A_COLUMN: usize = 10;
 
 /// The torque of a joint against a linear regression of it on the joint's motion: gravity, friction, the
 /// accelerations of all joints.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TorqueDemand {
-    /// What is slower than this counts as slow \[Hz\].
+    /// Content slower than this counts as slow \[Hz\].
     pub slow_hz: f64,
     /// Root mean square of the slow torque about its mean \[N m\].
     pub slow_nm: f64,
-    /// Root mean square of the rest: what is faster than the motion \[N m\].
+    /// Root mean square of the rest, which is faster than the motion \[N m\].
     pub fast_nm: f64,
     /// The largest torque that the motion needs, by the regression of the slow torque \[N m\].
     pub needed_nm: f64,
@@ -35,7 +35,7 @@ pub struct TorqueDemand {
     pub explained: f64,
 }
 
-/// Compares one joint's torque with its motion; `None` for a torque that is constant or a log too short.
+/// Compares one joint's torque with its motion; `None` if the torque is constant or the log too short.
 ///
 /// `fast_rad_s` holds the fast speed of every joint; the motions are smoothed over `half_width_s` on either side.
 pub(super) fn torque_demand(

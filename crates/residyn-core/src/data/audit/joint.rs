@@ -25,8 +25,8 @@ const REST_SHARE_OF_FAST: f64 = 0.01;
 /// encoder flickers over two or three steps, and a creeping joint over five or six.
 pub(super) const VISIBLE_STEPS: f64 = 10.0;
 
-/// Torque and acceleration are compared after smoothing over this on either side \[s\]: accelerations from an encoder
-/// of a few mrad are mostly noise over less.
+/// Torque and acceleration are compared after smoothing over this on either side \[s\]: over less, accelerations from
+/// an encoder of a few mrad are mostly noise.
 const SLOW_S: f64 = 0.05;
 
 /// One joint of a log.
@@ -39,23 +39,23 @@ pub struct JointAudit {
     pub qd: Channel,
     /// The torque \[N m\], or the command of the drive.
     pub tau: Channel,
-    /// How the logged velocity compares with the derivative of the angle; `None` where one of them
-    /// stands still, the joint is too slow to be told from one at rest, or the log is too short.
+    /// How the logged velocity compares with the derivative of the angle; `None` if one of them stands still, the joint
+    /// is too slow to be distinguished from one at rest, or the log is too short.
     pub velocity: Option<VelocityCheck>,
-    /// Correlation of the logged velocity with the negative derivative of the angle, where it does not follow the
+    /// Correlation of the logged velocity with the negative derivative of the angle, if it does not follow the
     /// derivative itself.
     pub opposed: Option<f64>,
-    /// How the acceleration answers to torque and motion; `None` where there is none, or the log is too short.
+    /// How the acceleration responds to torque and motion; `None` if there is no acceleration, or the log is too short.
     pub response: Option<Response>,
-    /// How the acceleration trails the torque; `None` where the torque is constant, or too little of
-    /// the acceleration follows it to tell.
+    /// How the acceleration trails the torque; `None` if the torque is constant, or too little of the acceleration
+    /// follows it.
     pub torque_lag: Option<TorqueLag>,
-    /// How the torque compares with what the motion needs; `None` where it is constant or the log is too short.
+    /// How the torque compares with what the motion needs; `None` if it is constant or the log is too short.
     pub torque_demand: Option<TorqueDemand>,
-    /// How often the motion changes direction in the rows that are examined, jitter about rest not counted.
+    /// How often the motion changes direction in the examined rows, jitter about rest not counted.
     pub reversals: usize,
-    /// Share of the rows at rest: slower than 1 % of the fast speed, or than three standard deviations
-    /// of what noise on the angle looks like as a velocity.
+    /// Share of the rows at rest: slower than 1 % of the fast speed, or than three standard deviations of the velocity
+    /// noise that noise on the angle causes.
     pub share_at_rest: f64,
     /// Speed that 95 % of the rows stay below \[rad/s\], from the angles.
     pub fast_rad_s: f64,
@@ -82,7 +82,7 @@ pub(super) fn audit_joints(log: &Log) -> Vec<JointAudit> {
     with_motions(log).0
 }
 
-/// As [`audit_joints`], with the motions that accelerations are compared with torques in.
+/// As [`audit_joints`], with the motions in which accelerations are compared with torques.
 pub(super) fn with_motions(log: &Log) -> (Vec<JointAudit>, Vec<Motion>) {
     let jumps: Vec<Vec<usize>> = log.q.iter().map(|q| rows_that_jump(q)).collect();
     let log = &*log.without(&jumps);
@@ -106,7 +106,7 @@ pub(super) fn with_motions(log: &Log) -> (Vec<JointAudit>, Vec<Motion>) {
             joints[joint].torque_lag = torque_lag(&slow, &fast, joint, step_s);
             joints[joint].torque_demand = torque_demand(&slow, &fast, joint, slow_s);
         } else if let Some(response) = &mut joints[joint].response {
-            // What a drive makes of its command depends on the motion.
+            // The torque that a drive makes of its command depends on the motion.
             response.to_torque = None;
         }
     }
@@ -120,7 +120,7 @@ impl JointAudit {
         !self.q.constant && self.q.range() >= visible
     }
 
-    /// All but what needs the other joints as well, or the log as it is.
+    /// Everything except what needs the other joints as well, or the log as it is.
     fn of(log: &Log, step_s: f64, joint: Joint, motion: &Motion) -> Self {
         let (q, qd, tau) = (&log.q[joint], &log.qd[joint], &log.tau[joint]);
         let channel = |kind: &str, values, spikes| Channel::of(joint.name(kind), values, spikes);
@@ -156,9 +156,9 @@ impl JointAudit {
             fast_rad_s,
             covers_full_turn: q_channel.range() >= std::f64::consts::TAU,
             repeated_fraction: repeats.rows.len() as f64 / repeats.moving.max(1) as f64,
-            disagreeing: log.stretches(disagreeing.iter().copied()),
-            at_rest: log.stretches(resting),
-            repeated: log.stretches(repeats.rows),
+            disagreeing: log.intervals(disagreeing.iter().copied()),
+            at_rest: log.intervals(resting),
+            repeated: log.intervals(repeats.rows),
             q: q_channel,
             qd: Channel {
                 spikes: disagreeing.len(),
@@ -169,7 +169,7 @@ impl JointAudit {
     }
 }
 
-/// The speed below which a joint cannot be told from one at rest \[rad/s\].
+/// The speed below which a joint cannot be distinguished from one at rest \[rad/s\].
 fn rest_speed(q: &Channel, fast_rad_s: f64, step_s: f64) -> f64 {
     let half_width = half_width_s(step_s);
     let rows = 1.0 + 2.0 * half_width / step_s;
@@ -179,7 +179,7 @@ fn rest_speed(q: &Channel, fast_rad_s: f64, step_s: f64) -> f64 {
     of_noise.max(REST_SHARE_OF_FAST * fast_rad_s)
 }
 
-/// Changes of direction, where both directions are faster than `rest`.
+/// Changes of direction with speeds above `rest` on both sides.
 fn reversals(velocity: &[f64], rest: f64) -> usize {
     let moving: Vec<f64> = velocity
         .iter()

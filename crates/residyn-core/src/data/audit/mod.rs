@@ -1,12 +1,13 @@
 //! What a log is good for: units, signs, sampling, noise, jumps, lags and excitation, measured before any fit.
 //!
-//! The audit reads the log alone and no model but for the names of its columns. It changes nothing: what it finds is
-//! told, and the fit decides. Intervals that are left out are read like all others.
+//! The audit reads the log alone and, of the model, only the names of its columns. It changes nothing: findings are
+//! reported, and the fit decides. Left-out intervals are read like all others.
 
 mod channel;
 mod compare;
 mod demand;
 mod findings;
+mod intervals;
 mod joint;
 mod misread;
 mod motion;
@@ -15,7 +16,7 @@ mod regressors;
 mod repeats;
 mod response;
 mod rest;
-mod stretches;
+
 mod table;
 
 pub use channel::Channel;
@@ -24,7 +25,7 @@ pub use demand::TorqueDemand;
 pub use joint::JointAudit;
 pub(crate) use misread::reversed_driving;
 pub use quality::{Audit, Finding, Remedy, Severity};
-pub use repeats::{Repeated, tell_repeats};
+pub use repeats::{Repeated, report_repeats};
 pub use response::Response;
 
 use std::ops::Range;
@@ -38,30 +39,30 @@ use super::statistics::{deviation, median};
 
 /// Measures the quality of a log that was read from these columns.
 ///
-/// The numbers are those of the log as it was read. Where columns hold something else than was asked for, the first
+/// The numbers are those of the log as it was read. If columns hold something other than was asked for, the first
 /// findings say so, and the others are about the log as it is meant.
 ///
 /// Works on any log that [`Log::of_table`] returns; quantities that need more rows or more motion than
 /// the log has are `None` or 0, as their documentation says.
 pub fn audit(log: &Log, columns: &Columns) -> Audit {
     let mut audit = of_log(log, columns);
-    rest::tell_rest(std::slice::from_mut(&mut audit));
+    rest::report_rest(std::slice::from_mut(&mut audit));
     audit
 }
 
-/// Measures the quality of logs that are used together, as [`audit`] does that of each: a joint may rest in one that moves
-/// in another.
+/// Measures the quality of logs that are used together, as [`audit`] does for one log: a joint may rest in one log and
+/// move in another.
 pub fn audit_together<'l>(
     logs: impl IntoIterator<Item = &'l Log>,
     columns: &Columns,
 ) -> Vec<Audit> {
     let logs = logs.into_iter();
     let mut audits: Vec<Audit> = logs.map(|log| of_log(log, columns)).collect();
-    rest::tell_rest(&mut audits);
+    rest::report_rest(&mut audits);
     audits
 }
 
-/// What a log alone tells.
+/// The audit of a log by itself.
 fn of_log(log: &Log, columns: &Columns) -> Audit {
     let (meant, misread) = misread::as_meant(log, columns);
     let mut audit = measured(&meant.log, meant.joints);

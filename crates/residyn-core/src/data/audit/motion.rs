@@ -10,14 +10,14 @@ use crate::data::signal::resample;
 
 /// One joint's channels at the rows where the motion around them is known.
 ///
-/// These are the rows that are examined and that a cubic can be fitted around: not the ends of the log, nor its gaps. They
+/// These are the examined rows around which a cubic can be fitted: neither the ends of the log nor its gaps. They
 /// depend on the times alone, so they are the same rows for all joints of a log.
 #[derive(Clone)]
 pub(super) struct Motion {
     /// The rows.
     pub rows: Vec<usize>,
-    /// Which of them belong to each stretch of the log that is examined.
-    pub stretches: Vec<Range<usize>>,
+    /// Which of them belong to each examined interval of the log.
+    pub intervals: Vec<Range<usize>>,
     /// Time of the rows \[s\].
     pub time: Vec<f64>,
     /// Smoothed angle \[rad\].
@@ -26,7 +26,7 @@ pub(super) struct Motion {
     pub velocity: Vec<f64>,
     /// Acceleration from the angles \[rad/s^2\].
     pub acceleration: Vec<f64>,
-    /// Torque smoothed as the angles are \[N m\].
+    /// Torque, smoothed like the angles \[N m\].
     pub tau: Vec<f64>,
     /// Torque as logged \[N m\], not smoothed.
     pub tau_logged: Vec<f64>,
@@ -41,7 +41,7 @@ impl Motion {
     pub fn of(log: &Log, joint: Joint, half_width_s: f64) -> Self {
         let mut motion = Self {
             rows: vec![],
-            stretches: vec![],
+            intervals: vec![],
             time: vec![],
             q: vec![],
             velocity: vec![],
@@ -51,17 +51,17 @@ impl Motion {
             qd: vec![],
             moved: vec![],
         };
-        for stretch in examined(log.rows()) {
+        for interval in examined(log.rows()) {
             let first = motion.rows();
-            motion.follow(log, joint, half_width_s, stretch);
-            motion.stretches.push(first..motion.rows());
+            motion.follow(log, joint, half_width_s, interval);
+            motion.intervals.push(first..motion.rows());
         }
         motion
     }
 
-    /// Adds a stretch of the log.
-    fn follow(&mut self, log: &Log, joint: Joint, half_width_s: f64, stretch: Range<usize>) {
-        for row in stretch.filter(|row| *row > 0) {
+    /// Adds an interval of the log.
+    fn follow(&mut self, log: &Log, joint: Joint, half_width_s: f64, interval: Range<usize>) {
+        for row in interval.filter(|row| *row > 0) {
             let fit = |values: &[f64]| local_cubic(&log.time, values, row, half_width_s);
             let (Some(q), Some(tau)) = (fit(&log.q[joint]), fit(&log.tau[joint])) else {
                 continue;
@@ -78,7 +78,7 @@ impl Motion {
         }
     }
 
-    /// The motion with all of it that is of the angle at this many times its size.
+    /// The motion with the angle and all its derivatives scaled by this factor.
     pub fn scaled(&self, factor: f64) -> Self {
         let mut scaled = self.clone();
         let of_angle = [
@@ -93,12 +93,12 @@ impl Motion {
         scaled
     }
 
-    /// One of its columns at a uniform step \[s\], stretch after stretch.
+    /// One of its columns at a uniform step \[s\], interval after interval.
     pub fn resampled(&self, values: &[f64], step_s: f64) -> Vec<f64> {
-        let stretches = self.stretches.iter().cloned();
+        let intervals = self.intervals.iter().cloned();
         let of_stretch =
             |rows: Range<usize>| resample(&self.time[rows.clone()], &values[rows], step_s);
-        stretches.flat_map(of_stretch).collect()
+        intervals.flat_map(of_stretch).collect()
     }
 
     /// Number of rows.

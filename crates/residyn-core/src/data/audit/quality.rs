@@ -10,7 +10,7 @@ use crate::data::Joint;
 use crate::data::column::Quantity;
 use crate::data::log::Interval;
 
-/// More stretches than these are no list to paste, and none to read.
+/// Longer lists of intervals than these are not practical to paste, or to read.
 const MOST_SPANS: usize = 20;
 const TOLD_SPANS: usize = 3;
 
@@ -21,8 +21,8 @@ pub struct Audit {
     pub log: String,
     /// Number of rows.
     pub rows: usize,
-    /// Rows that tell what channels look like and how joints move: all, or of a long log as many as say the same, in stretches
-    /// that are spread evenly over it.
+    /// Rows that show what channels look like and how joints move: all, or, for a long log, enough of them to show the
+    /// same, in intervals that are spread evenly over it.
     pub examined_rows: usize,
     /// Time from the first to the last row \[s\].
     pub duration_s: f64,
@@ -40,9 +40,9 @@ pub struct Audit {
     pub dropped_rows: usize,
     /// What drives the joints: torques or commands.
     pub driven_by: Quantity,
-    /// One entry a joint.
+    /// One entry per joint.
     pub joints: Vec<JointAudit>,
-    /// The log before it whose motion it has once more, among those that it was compared with.
+    /// The earlier log whose motion it repeats, among those that it was compared with.
     pub repeats: Option<String>,
     /// What an engineer should know before fitting, the most serious first.
     pub findings: Vec<Finding>,
@@ -68,15 +68,15 @@ impl Audit {
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// Results will be wrong or cannot be had from this log unless something is done.
+    /// Results will be wrong, or cannot be obtained from this log, unless something is done.
     Serious,
-    /// Results will be poorer, or some effects cannot be told apart.
+    /// Results will be poorer, or some effects cannot be distinguished.
     Warning,
     /// Good to know.
     Info,
 }
 
-/// One plain sentence about a log, with its evidence, its place and what mends it.
+/// One plain sentence about a log, with its evidence, its place and its remedy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Finding {
     /// How much it matters.
@@ -84,7 +84,7 @@ pub struct Finding {
     /// The joint that it concerns, if it is a single one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<Joint>,
-    /// Where it is in the log: start and end of each stretch in s, the longest where there are many. Empty where it
+    /// Where it is in the log: start and end of each interval in s, the longest ones if there are many. Empty if it
     /// concerns the whole log.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spans_s: Vec<[f64; 2]>,
@@ -94,7 +94,7 @@ pub struct Finding {
     pub remedy: Option<Remedy>,
 }
 
-/// What to paste to mend what was found.
+/// What to paste to fix a finding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Remedy {
@@ -116,7 +116,7 @@ impl Finding {
         }
     }
 
-    /// The same of one joint.
+    /// The same finding about one joint.
     pub(crate) fn of(self, joint: Joint) -> Self {
         Self {
             joint: Some(joint),
@@ -124,7 +124,7 @@ impl Finding {
         }
     }
 
-    /// The same in these stretches of a log, which can be left out where they are few.
+    /// The same finding in these intervals of a log, which can be left out if they are few.
     pub(crate) fn within(self, log: &str, spans: &[Interval]) -> Self {
         let argument = |span: &Interval| format!("{log}@{}-{}", span.start_s, span.end_s);
         let few = spans.len() <= MOST_SPANS;
@@ -134,7 +134,7 @@ impl Finding {
         }
     }
 
-    /// The same in these stretches of a log.
+    /// The same finding in these intervals of a log.
     pub(super) fn during(self, spans: &[Interval]) -> Self {
         Self {
             spans_s: longest(spans.iter().map(ends).collect(), MOST_SPANS),
@@ -142,8 +142,8 @@ impl Finding {
         }
     }
 
-    /// The sentence, and in brackets what mends it, in the words of the caller, or else where it is so.
-    pub fn told(&self, words: RemedyWords<'_>) -> String {
+    /// The sentence, and in brackets its remedy, in the words of the caller, or else its place.
+    pub fn message(&self, words: RemedyWords<'_>) -> String {
         let more = self.remedy.as_ref().map(words);
         match more.or_else(|| self.place()) {
             Some(more) => format!("{} ({more})", self.text),
@@ -151,16 +151,16 @@ impl Finding {
         }
     }
 
-    /// Where it is in the log, `t = 2 to 3.2 s, 5 to 6 s and shorter`; `None` where it concerns the whole log.
+    /// Where it is in the log, `t = 2 to 3.2 s, 5 to 6 s and shorter`; `None` if it concerns the whole log.
     pub(super) fn place(&self) -> Option<String> {
-        let told = longest(self.spans_s.clone(), TOLD_SPANS);
+        let message = longest(self.spans_s.clone(), TOLD_SPANS);
         let span = |[start, end]: &[f64; 2]| format!("{} to {} s", seconds(*start), seconds(*end));
-        let text = told.iter().map(span).collect::<Vec<_>>().join(", ");
-        let more = match self.spans_s.len() > told.len() {
+        let text = message.iter().map(span).collect::<Vec<_>>().join(", ");
+        let more = match self.spans_s.len() > message.len() {
             true => " and shorter",
             false => "",
         };
-        (!told.is_empty()).then(|| format!("t = {text}{more}"))
+        (!message.is_empty()).then(|| format!("t = {text}{more}"))
     }
 }
 
@@ -168,10 +168,10 @@ fn ends(span: &Interval) -> [f64; 2] {
     [span.start_s, span.end_s]
 }
 
-/// How the program that shows a finding calls what mends it.
+/// How the program that shows a finding words its remedy.
 pub(crate) type RemedyWords<'w> = &'w dyn Fn(&Remedy) -> String;
 
-/// The longest of some stretches, in the order of time.
+/// The longest of some intervals, in the order of time.
 fn longest(mut spans: Vec<[f64; 2]>, most: usize) -> Vec<[f64; 2]> {
     spans.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
     spans.truncate(most);
@@ -186,7 +186,7 @@ fn seconds(time_s: f64) -> f64 {
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.told(&Remedy::to_string))
+        f.write_str(&self.message(&Remedy::to_string))
     }
 }
 

@@ -4,14 +4,14 @@ use super::motion::Motion;
 use crate::data::Joint;
 
 /// Gravity, friction and coupling of a joint: a constant, the sine and cosine of all angles, all velocities and their
-/// smoothed signs, and the accelerations of the other joints; one column each, one value a row of the motions.
+/// smoothed signs, and the accelerations of the other joints; one column each, one value per row of the motions.
 ///
 /// `fast_rad_s` holds the fast speed of every joint.
 pub(super) fn regressors(motions: &[Motion], fast_rad_s: &[f64], joint: Joint) -> Vec<Vec<f64>> {
     let mut columns = vec![vec![1.0; motions[joint].rows()]];
     for (other, motion) in Joint::all(motions.len()).zip(motions) {
         let of = |values: &[f64], f: &dyn Fn(f64) -> f64| values.iter().map(|x| f(*x)).collect();
-        // Smooth over a tenth of the working speed, as a jump would be a feature of the noise at rest.
+        // Smooth over a tenth of the working speed, as a jump would follow the noise at rest.
         let width = 0.1 * fast_rad_s[other] + f64::MIN_POSITIVE;
         columns.push(of(&motion.velocity, &|v| (v / width).tanh()));
         columns.push(of(&motion.q, &f64::sin));

@@ -4,35 +4,36 @@ use crate::data::log::Log;
 use crate::data::smooth::resampled;
 use crate::data::statistics::deviation;
 
-/// Logs repeat each other whose angles differ by less than this share of their motion, root mean square: what a controller
-/// leaves that follows the same reference twice.
+/// Logs repeat each other if their angles differ by less than this share of their motion, root mean square: the error
+/// of a controller that follows the same reference twice.
 const SAME: f64 = 0.02;
 
-/// No encoder repeats a motion as closely as this: the file does.
+/// No encoder repeats a motion as closely as this: the file is the same.
 const IDENTICAL: f64 = 1e-9;
 
-/// A log that is shorter than this share of another repeats no more than a part of it.
+/// A log that is shorter than this share of another repeats only a part of it.
 const WHOLE: f64 = 0.8;
 
-/// A log before another one that has the same motion.
+/// An earlier log with the same motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Repeated {
     /// Its place among the logs.
     pub place: usize,
-    /// The root mean square of what the angles differ by, as a share of the motion.
+    /// Root mean square difference of the angles, as a share of the motion.
     share: f64,
 }
 
 impl Repeated {
-    /// Whether the two are one log rather than two of the same motion.
+    /// Whether the two are the same log rather than two logs of the same motion.
     pub fn is_identical(&self) -> bool {
         self.share < IDENTICAL
     }
 }
 
-/// Say of each log which one before it has the same motion, and return that one: as a test of the other it tells how well
-/// torques repeat, and nothing of other motions. A log that is the same comes before one that only moves alike.
-pub fn tell_repeats<'l>(
+/// Report for each log which earlier one has the same motion, and return that one: as a test of the other, it shows how
+/// well torques repeat, and nothing about other motions. An identical log takes precedence over one that only moves
+/// alike.
+pub fn report_repeats<'l>(
     logs: impl IntoIterator<Item = &'l Log>,
     audits: &mut [Audit],
 ) -> Vec<Option<Repeated>> {
@@ -85,8 +86,9 @@ fn motion(log: &Log) -> f64 {
     log.q.iter().map(of_joint).sum()
 }
 
-/// Difference of the angles of two logs, each in the time since its start, as a share of the motion of the first, whose mean
-/// square is `moves`. `None` where it is no repetition: they differ by more, in joints or in length, or nothing moves.
+/// Difference of the angles of two logs, each in the time since its start, as a share of the motion of the first, whose
+/// mean square is `moves`. `None` if it is not a repetition: they differ by more, in joints or in length, or nothing
+/// moves.
 fn difference(a: &Log, moves: f64, b: &Log) -> Option<f64> {
     let (shorter, longer) = (
         a.duration().min(b.duration()),
@@ -105,7 +107,7 @@ fn difference(a: &Log, moves: f64, b: &Log) -> Option<f64> {
             .map(|time| b.time[0] + since_start(time));
         for (a, b) in a_q.iter().zip(resampled(times, &b.time, b_q)) {
             differs += (a - b).powi(2);
-            // Of many logs most are told apart by their first rows.
+            // Most pairs of logs already differ in their first rows.
             if differs >= most {
                 return None;
             }
@@ -116,7 +118,7 @@ fn difference(a: &Log, moves: f64, b: &Log) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::tell_repeats;
+    use super::report_repeats;
     use crate::data::{Audit, Columns, Log, audit};
 
     /// Two joints on sines of this frequency, from this time on.
@@ -136,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_motion_once_more_is_told_with_the_log_that_it_repeats() {
+    fn the_same_motion_once_more_is_reported_with_the_log_that_it_repeats() {
         let logs = [
             log("a.csv", 0.0, 2.0, 0.0),
             log("b.csv", 5.0, 2.0, 0.004),
@@ -149,17 +151,17 @@ mod tests {
             .iter()
             .map(|log| audit(log, &Columns::default()))
             .collect();
-        let repeated = tell_repeats(&logs, &mut audits);
-        let told = |words: &str| -> Vec<bool> {
+        let repeated = report_repeats(&logs, &mut audits);
+        let message = |words: &str| -> Vec<bool> {
             let says = |audit: &Audit| audit.findings.iter().any(|f| f.text.contains(words));
             audits.iter().map(says).collect()
         };
-        let repeats = told("the motion is that of a.csv once more");
+        let repeats = message("the motion is that of a.csv once more");
         assert_eq!(repeats, [false, true, false, false, false, false]);
-        let is_same = told("every angle is that of c.csv");
+        let is_same = message("every angle is that of c.csv");
         assert_eq!(is_same, [false, false, false, false, true, false]);
-        // Of a log that moves alike and one that is the same, the latter is named.
-        let is_same = told("every angle is that of b.csv");
+        // If one log moves alike and another is identical, the latter is named.
+        let is_same = message("every angle is that of b.csv");
         assert_eq!(is_same, [false, false, false, false, false, true]);
         let places = repeated
             .iter()

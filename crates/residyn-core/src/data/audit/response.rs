@@ -7,11 +7,11 @@ use super::regressors::regressors;
 use crate::data::Joint;
 use crate::data::projection::{dot, explained_by, free_of, orthonormal};
 
-/// Fewer rows than this for each column of the regression say nothing.
+/// A regression with fewer rows than this per column says nothing.
 const ROWS_A_COLUMN: usize = 10;
 
-/// Of an acceleration of which the motion itself leaves a smaller share open, what is left does not tell how it answers to the
-/// torque: a smooth motion of many joints explains its own accelerations.
+/// If the motion itself leaves a smaller share of an acceleration unexplained, the rest does not show how it responds
+/// to the torque: a smooth motion of many joints explains its own accelerations.
 const LEFT: f64 = 0.01;
 
 /// The acceleration of a joint against a linear regression on its torque, gravity, friction and the accelerations of
@@ -20,13 +20,13 @@ const LEFT: f64 = 0.01;
 pub struct Response {
     /// Share of the acceleration's variance that they explain together.
     pub explained: f64,
-    /// Correlation of the acceleration with the torque, after what the others explain is taken out of both: above zero in
-    /// every mechanism, since its mass matrix is positive definite. `None` for a torque that is constant, and where
-    /// the others explain the torque or nearly all of the acceleration.
+    /// Correlation of the acceleration with the torque, after the part that the others explain is removed from both:
+    /// above zero in every mechanism, since its mass matrix is positive definite. `None` if the torque is constant, or
+    /// if the others explain the torque or nearly all of the acceleration.
     pub to_torque: Option<f64>,
 }
 
-/// `None` for a joint without acceleration or a log too short; `fast_rad_s` holds the fast speed of every joint.
+/// `None` if the joint has no acceleration or the log is too short; `fast_rad_s` holds the fast speed of every joint.
 pub(super) fn response(motions: &[Motion], fast_rad_s: &[f64], joint: Joint) -> Option<Response> {
     let motion = &motions[joint];
     let columns = regressors(motions, fast_rad_s, joint);
@@ -54,7 +54,7 @@ pub(super) fn response(motions: &[Motion], fast_rad_s: &[f64], joint: Joint) -> 
     })
 }
 
-/// Sum of squares that a basis leaves of a series.
+/// Sum of squares of a series that a basis leaves unexplained.
 fn left(basis: &[Vec<f64>], series: &[f64]) -> f64 {
     let part = explained_by(basis, series);
     series

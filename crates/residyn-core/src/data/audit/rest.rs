@@ -5,8 +5,8 @@ use super::quality::{Audit, Finding, Severity};
 use super::table::short;
 use crate::data::Joint;
 
-/// Say of each log which joints do not move in it. That is serious where none of the other logs moves the joint.
-pub(super) fn tell_rest(audits: &mut [Audit]) {
+/// Report for each log which joints do not move in it. That is serious if none of the other logs moves the joint.
+pub(super) fn report_rest(audits: &mut [Audit]) {
     let joints = audits.iter().map(|audit| audit.joints.len()).max();
     for joint in Joint::all(joints.unwrap_or(0)) {
         let moves = |audit: &Audit| Some(audit.joints.get(joint.index())?.moves());
@@ -38,7 +38,7 @@ mod tests {
     use super::super::audit_together;
     use crate::data::{Columns, Log, Severity};
 
-    /// Two joints, of which the second moves so far.
+    /// Two joints, the second with this amplitude.
     fn log(name: &str, second: f64) -> Log {
         let mut log = Log::empty(2);
         log.path = name.into();
@@ -54,7 +54,7 @@ mod tests {
         log
     }
 
-    fn told(logs: &[Log]) -> Vec<Vec<Severity>> {
+    fn message(logs: &[Log]) -> Vec<Vec<Severity>> {
         let audits = audit_together(logs, &Columns::default());
         let of_log = |audit: super::Audit| {
             let findings = audit.findings.into_iter();
@@ -67,11 +67,11 @@ mod tests {
     #[test]
     fn a_joint_that_rests_in_one_log_is_serious_where_no_other_moves_it() {
         let (moves, rests) = (log("moves.csv", 0.5), log("rests.csv", 0.0));
-        assert_eq!(told(std::slice::from_ref(&rests)), [[Severity::Serious]]);
+        assert_eq!(message(std::slice::from_ref(&rests)), [[Severity::Serious]]);
         assert_eq!(
-            told(&[rests.clone(), rests.clone()]),
+            message(&[rests.clone(), rests.clone()]),
             [[Severity::Serious], [Severity::Serious]]
         );
-        assert_eq!(told(&[moves, rests]), [vec![], vec![Severity::Info]]);
+        assert_eq!(message(&[moves, rests]), [vec![], vec![Severity::Info]]);
     }
 }

@@ -11,8 +11,8 @@ use crate::layout::{LABEL, hanging, wrap};
 const WIDTH: usize = 80;
 
 impl fmt::Display for Audit {
-    /// Sampling, one line a channel, one line a joint, and the findings; no line is longer than 80
-    /// characters, but for a word that is and for what is to be pasted.
+    /// Sampling, one line per channel, one line per joint, and the findings; no line is longer than 80 characters,
+    /// except for a single long word and for text to be pasted.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let words = |remedy: &Remedy| match remedy {
             Remedy::LeaveOut(_) => remedy.to_string(),
@@ -22,7 +22,7 @@ impl fmt::Display for Audit {
     }
 }
 
-/// An audit with what mends it in the words of the program that shows it.
+/// An audit with its remedies in the words of the program that shows it.
 struct InWords<'a>(&'a Audit, RemedyWords<'a>);
 
 impl fmt::Display for InWords<'_> {
@@ -32,8 +32,8 @@ impl fmt::Display for InWords<'_> {
 }
 
 impl Audit {
-    /// The same text, where these words say what mends a finding.
-    pub fn told(&self, words: RemedyWords<'_>) -> String {
+    /// The same text, with the remedies in these words.
+    pub fn message(&self, words: RemedyWords<'_>) -> String {
         InWords(self, words).to_string()
     }
 
@@ -155,7 +155,7 @@ pub(super) fn short(value: f64) -> String {
     } else {
         size.log10() as usize + 1
     };
-    // Small numbers keep their digits: 0.002914 has two zeros that say nothing.
+    // Small numbers keep their digits: 0.002914 has two zeros that are not significant.
     let zeros = if size > 0.0 && size < 0.1 {
         (-size.log10()) as usize
     } else {

@@ -30,7 +30,7 @@ const BINARY: [Binary; 9] = [
     Binary::Less,
 ];
 
-/// Some operations on whatever stands before them; sums and products are the most.
+/// Some operations on the nodes before them, mostly sums and products.
 fn program(rng: &mut ChaCha8Rng) -> Program {
     let mut graph = Graph::new();
     let mut nodes: Vec<Node> = (0..INPUTS).map(|k| graph.input(&format!("x{k}"))).collect();
@@ -51,8 +51,8 @@ fn program(rng: &mut ChaCha8Rng) -> Program {
     graph.finish(&outputs)
 }
 
-/// Each operation's value one by one, and how far it may be off where each rounds to a few parts in 1 / `unit`:
-/// infinite where a rounding may turn a decision.
+/// Each operation's value one by one, and how far it may be off if each rounds to a few parts in 1 / `unit`: infinite
+/// where rounding may flip a decision.
 fn plain(program: &Program, inputs: &[f64], unit: f64) -> Vec<(f64, f64)> {
     let mut known: Vec<(f64, f64)> = Vec::new();
     for op in program.ops() {
@@ -96,7 +96,7 @@ fn plain(program: &Program, inputs: &[f64], unit: f64) -> Vec<(f64, f64)> {
     known
 }
 
-/// `then` where the sign of `a`, which is off by so much, is certain.
+/// `then` if the sign of `a`, which may be off by `off`, is certain.
 fn decided(a: f64, off: f64, then: f64) -> f64 {
     if a.abs() > off || off == 0.0 {
         then
@@ -105,7 +105,7 @@ fn decided(a: f64, off: f64, then: f64) -> f64 {
     }
 }
 
-/// How far the value of `op` at `a` may be off where `a` is off by `off`.
+/// How far the value of `op` at `a` may be off if `a` is off by `off`.
 fn spread_of_unary(op: Unary, a: f64, off: f64, value: f64) -> f64 {
     match op {
         Unary::Neg | Unary::Abs | Unary::Sin | Unary::Cos | Unary::Tanh => off,
@@ -117,7 +117,7 @@ fn spread_of_unary(op: Unary, a: f64, off: f64, value: f64) -> f64 {
     }
 }
 
-/// The same for two operands.
+/// As above, for two operands.
 fn spread_of_binary(op: Binary, [a, b]: [f64; 2], [off_a, off_b]: [f64; 2], value: f64) -> f64 {
     match op {
         Binary::Add | Binary::Sub => off_a + off_b,
@@ -125,7 +125,7 @@ fn spread_of_binary(op: Binary, [a, b]: [f64; 2], [off_a, off_b]: [f64; 2], valu
         Binary::Div => decided(b, 10.0 * off_b, (off_a + value.abs() * off_b) / b.abs()),
         Binary::Pow => {
             let parts = b * off_a / a.abs() + a.abs().ln() * off_b;
-            // Of a negative number only whole powers are numbers.
+            // Only whole powers of a negative number are real.
             let fragile = a <= 10.0 * off_a || off_b > 0.0 && a < 0.0;
             if fragile && off_a + off_b > 0.0 {
                 f64::INFINITY
@@ -135,7 +135,7 @@ fn spread_of_binary(op: Binary, [a, b]: [f64; 2], [off_a, off_b]: [f64; 2], valu
         }
         Binary::Atan2 => {
             let round = off_a + off_b;
-            // Behind the origin the angle jumps.
+            // The angle jumps behind the origin.
             let fragile = b < 0.0 && a.abs() <= off_a || a.hypot(b) <= 10.0 * round;
             if fragile && round > 0.0 {
                 f64::INFINITY
@@ -148,7 +148,7 @@ fn spread_of_binary(op: Binary, [a, b]: [f64; 2], [off_a, off_b]: [f64; 2], valu
     }
 }
 
-/// Compare the tape with the plain values; how many could be compared.
+/// Compare the tape with the plain values; returns how many could be compared.
 fn compare<T: Element, const W: usize, S: Simd>(simd: impl Fn() -> Option<S>, unit: f64) -> usize {
     let Some(simd) = simd() else { return 0 };
     let mut rng = ChaCha8Rng::seed_from_u64(7);

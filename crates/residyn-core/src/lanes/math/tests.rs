@@ -51,8 +51,7 @@ impl<T: Element> WithSimd for Apply<'_, T> {
     }
 }
 
-/// The function on every set of instructions that this processor has; on plain numbers it is the standard
-/// library's own.
+/// The function on every set of instructions that this processor has; on plain numbers it is the standard library's.
 fn everywhere<T: Element>(function: Function, x: &[T]) -> Vec<Vec<T>> {
     let apply = || Apply(function, x);
     let mut all = vec![Arch::new().dispatch(apply())];
@@ -137,7 +136,7 @@ fn nan_and_infinity_give_what_the_standard_library_gives() {
         -745.0,
     ];
     for function in [Sin, Cos, Exp, Tanh] {
-        // Apart, as one large angle sends all lanes the long way.
+        // Separately, since one large angle sends all lanes down the slow path.
         for x in x {
             for found in everywhere(function, &[x; 3]) {
                 let wanted = function.of_number(x);

@@ -9,7 +9,7 @@ use super::series::{Wave, rounded};
 use crate::data::Joint;
 use crate::decomposition::least_squares;
 
-/// Least part of a column that is independent of the others, relative to its length.
+/// Smallest part of a column that counts as independent of the others, relative to its length.
 const INDEPENDENT: f64 = 1e-10;
 
 /// A base parameter: a physical parameter together with those that the motion determines only in combination with it.
@@ -17,7 +17,7 @@ const INDEPENDENT: f64 = 1e-10;
 pub(super) struct Base {
     /// The physical parameter, and the contribution of a unit of the combination to the equations.
     pub column: Column,
-    /// Of the combination.
+    /// Value of the combination.
     pub value: f64,
     /// The other parameters: factor, kind and joint.
     pub others: Vec<(f64, Kind, Joint)>,

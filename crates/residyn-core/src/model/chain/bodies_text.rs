@@ -62,7 +62,7 @@ impl Bodies<'_> {
         links.flat_map(|(number, _)| all(number)).collect()
     }
 
-    /// With their numbers along the chain, which name their parameters.
+    /// The links with their numbers along the chain, which appear in the names of their parameters.
     fn links(&self) -> impl Iterator<Item = (data::Joint, &Joint)> {
         let joints = self.0.joints.iter().enumerate();
         joints.map(|(k, joint)| (data::Joint::at(k), joint))
@@ -138,7 +138,7 @@ fn link(text: &mut String, number: data::Joint, joint: &Joint, place: &Place) {
     );
 }
 
-/// How a link follows a joint that moves another one.
+/// How a link follows a joint that also moves another link.
 fn follows(joint: &Joint, place: &Place) -> String {
     match joint.follows {
         Some(_) => format!(

@@ -14,7 +14,7 @@ pub struct Spring {
     pub rest: f64,
 }
 
-/// What acts on a joint beside inertia and gravity.
+/// What acts on a joint besides inertia and gravity.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Drivetrain {
     /// N m s/rad, or N s/m.
@@ -26,7 +26,7 @@ pub struct Drivetrain {
     pub spring: Option<Spring>,
     /// Effort limit of the drive, N m or N.
     pub effort: Option<f64>,
-    /// A loop that holds the joint at the position that is commanded.
+    /// A loop that holds the joint at the commanded position.
     pub servo: Option<Servo>,
 }
 
@@ -39,7 +39,7 @@ pub struct Servo {
     pub damping: f64,
 }
 
-/// How a joint follows another one: its coordinate is `ratio * q + offset` of the leader's q.
+/// How a joint follows another: its coordinate is `ratio * q + offset`, with the leader's q.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Follows {
     /// Index of the leader among the joints of the chain.
@@ -57,8 +57,7 @@ pub struct Joint {
     pub body: String,
     /// Whether it slides along its axis rather than turning about it.
     pub slides: bool,
-    /// The joint's frame in that of the previous joint (or the world) where the joint's coordinate is `reference`; z is
-    /// the joint's axis.
+    /// The joint's frame in that of the previous joint (or the world) at coordinate `reference`; z is the joint's axis.
     pub pose: Pose,
     /// rad or m
     pub reference: f64,
@@ -70,7 +69,7 @@ pub struct Joint {
     pub anchor: Vector3<f64>,
     /// In the joint's frame.
     pub inertia: Inertia,
-    /// Another joint of the chain that moves it.
+    /// The joint of the chain that it follows, if any.
     pub follows: Option<Follows>,
     pub drivetrain: Drivetrain,
 }
@@ -88,12 +87,12 @@ impl Joint {
         }
     }
 
-    /// The joint's frame in that of the previous joint (or the world) where its coordinate is zero.
+    /// The joint's frame in that of the previous joint (or the world) at coordinate zero.
     pub fn at_zero(&self) -> Pose {
         self.at(0.0)
     }
 
-    /// The same where its coordinate (rad or m) is this.
+    /// As above, at this coordinate (rad or m).
     pub fn at(&self, coordinate: f64) -> Pose {
         let moved = coordinate - self.reference;
         let moved = if self.slides {
@@ -129,10 +128,10 @@ impl Joint {
 #[derive(Debug, Clone)]
 pub struct Chain {
     pub name: String,
-    /// Acceleration, m/s^2, in the frame of the world.
+    /// Acceleration, m/s^2, in the world frame.
     pub gravity: Vector3<f64>,
     pub joints: Vec<Joint>,
-    /// What drives every joint, where that is known and no torque.
+    /// What drives every joint, if known and not a torque.
     pub drive: Option<ReadyDrive>,
     /// Properties of the file that the model file does not carry, or carries in another form.
     pub notes: Vec<String>,

@@ -10,7 +10,7 @@ use super::model_file::{name, quoted, short, unit};
 use super::series::{Series, rounded};
 use crate::data;
 
-/// Lines of formulas are broken beyond this many characters.
+/// Formulas longer than this many characters are broken into lines.
 const WIDTH: usize = 110;
 
 /// The equations of motion as formulas, and their base parameters.
@@ -45,7 +45,7 @@ impl<'c> ClosedForm<'c> {
         [self.parameters(), self.dynamics(), self.energy()].concat()
     }
 
-    /// What each parameter is a sum of: factor, kind and joint.
+    /// The terms of which each parameter is the sum: factor, kind and joint.
     pub fn sums(&self) -> impl Iterator<Item = (&str, Vec<(f64, Kind, data::Joint)>)> {
         let parts = |base: &Base| {
             let own = (1.0, base.column.kind, base.column.joint);
@@ -55,7 +55,7 @@ impl<'c> ClosedForm<'c> {
         names.zip(self.base.iter().map(parts))
     }
 
-    /// For each joint the inertia of its rotor that is no part of another parameter.
+    /// For each joint, the rotor inertia that is not part of another parameter.
     pub fn rotors(&self) -> Vec<f64> {
         let of_joint = |joint: data::Joint| {
             let mut rotors = self.rotors.iter();

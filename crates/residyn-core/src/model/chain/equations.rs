@@ -12,7 +12,7 @@ use crate::data;
 /// A vector of functions.
 type Vector = [Series; 3];
 
-/// A kind of physical parameter. Where the motion determines only combinations, those about the axis are preferred.
+/// A kind of physical parameter. If the motion determines only combinations, kinds about the axis are preferred.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Entries of the inertia tensor about the joint's frame.
@@ -51,7 +51,7 @@ pub(super) struct Column {
 }
 
 impl Kind {
-    /// Those of a body.
+    /// The kinds that a body has.
     pub const OF_BODY: [Self; 10] = OF_TURNING;
 
     /// `zz`, `mx`, `m`, `J`.
@@ -65,7 +65,7 @@ impl Kind {
         }
     }
 
-    /// Exponent of length in the unit of its coefficients in the mass matrix between joints that turn.
+    /// Exponent of length in the unit of its mass-matrix coefficients between joints that turn.
     fn lengths(self) -> i32 {
         match self {
             Self::Tensor(..) | Self::Rotor => 0,
@@ -74,7 +74,7 @@ impl Kind {
         }
     }
 
-    /// The value of a joint's parameter; 0 where it is rounding.
+    /// The value of a joint's parameter; 0 if it is rounding.
     pub fn value(self, joint: &Joint) -> f64 {
         let (inertia, size) = (&joint.inertia, joint.inertia.tensor.trace());
         let (value, size) = match self {
@@ -124,7 +124,7 @@ fn rotor(joints: usize, joint: usize) -> Vec<Vec<Series>> {
 
 /// The motion of a link's frame, in its own axes.
 struct Frame {
-    /// For each joint the velocity of the origin per unit of joint velocity.
+    /// For each joint, the velocity of the origin per unit of joint velocity.
     linear: Vec<Vector>,
     /// The same for the angular velocity.
     angular: Vec<Vector>,

@@ -12,7 +12,7 @@ pub(super) fn sum(terms: &[(&str, &Series)]) -> String {
     if text.is_empty() { "0".into() } else { text }
 }
 
-/// A product of two factors, the first in parentheses where that is a sum.
+/// A product of two factors, the first in parentheses if it is a sum.
 pub(super) fn factors(first: &str, second: &str) -> String {
     match first {
         "1" => second.into(),
@@ -21,7 +21,7 @@ pub(super) fn factors(first: &str, second: &str) -> String {
     }
 }
 
-/// Whether there is a sign outside of all parentheses, other than a leading one.
+/// Whether there is a sign outside all parentheses, other than a leading one.
 fn is_sum(formula: &str) -> bool {
     let mut depth = 0;
     formula.split(' ').any(|word| {

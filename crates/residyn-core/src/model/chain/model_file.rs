@@ -15,14 +15,14 @@ use crate::data;
 use crate::model::ready_drive::write_plain;
 use crate::model::{Library, ReadyDrive};
 
-/// The drive of a position loop, and the parameter of drives that is their effort limit.
+/// The drive of a position loop, and the drive parameter that is the effort limit.
 const SERVO: &str = "position_servo";
 const LIMIT: &str = "limit";
 
 const ABOUT: &str = "equations derived from the description of a serial mechanism";
 
-/// The text of a model file for a chain: of up to three joints its equations in closed form with base parameters, of more
-/// its bodies; damping, dry friction, rotors, springs and effort limits as effects.
+/// The text of a chain's model file: up to three joints as equations in closed form with base parameters, longer chains
+/// as bodies; damping, dry friction, rotors, springs and effort limits as effects.
 pub fn model_text(chain: &Chain) -> String {
     let (equations, rotors) = if is_short(chain) {
         let closed = ClosedForm::of(chain);
@@ -41,7 +41,7 @@ pub(super) fn is_short(chain: &Chain) -> bool {
     chain.joints.len() <= LONGEST_CLOSED_FORM && !chain.joints.iter().any(follows)
 }
 
-/// The text with the drives of the joints, where some joint is not driven by a torque.
+/// The text with the joints' drives, if some joint is not driven by a torque.
 fn with_drives(text: String, chain: &Chain) -> String {
     let servo = |joint: &Joint| joint.drivetrain.servo.is_some();
     if chain.drive.is_none() && !chain.joints.iter().any(servo) {
@@ -98,7 +98,7 @@ fn head(chain: &Chain) -> String {
         .leaders()
         .map(|(_, joint)| quoted(&joint.name))
         .collect();
-    // In MJCF joints may have no names.
+    // In MJCF, joints need not have names.
     if names.iter().collect::<HashSet<_>>().len() == names.len() {
         let _ = writeln!(text, "joint_names = [{}]", names.join(", "));
     }
@@ -145,7 +145,7 @@ pub(super) fn short(value: f64) -> f64 {
     if short.abs() < 1e-12 { 0.0 } else { short }
 }
 
-/// Drivetrains as effects, with the inertia (kg m^2 or kg) of the rotor of each joint.
+/// Drivetrains as effects, with the rotor inertia (kg m^2 or kg) of each joint.
 fn effects(chain: &Chain, rotors: &[f64]) -> String {
     let mut text = String::new();
     for (number, joint) in chain.leaders() {

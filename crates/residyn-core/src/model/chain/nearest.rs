@@ -1,14 +1,16 @@
 //! The bodies nearest to given ones with given sums of their parameters.
 //!
-//! A body is possible where its pseudo-inertia, the matrix of the second moments of its mass over (x, y, z, 1), is positive. The distance
-//! of one body from another is the Bregman divergence of the logarithm of the determinant of these matrices, which does not depend on frames
-//! or units and grows beyond all bounds towards impossible bodies (Lee, Wensing and Park, Geometric robot dynamic identification, 2020).
+//! A body is possible if its pseudo-inertia, the matrix of the second moments of its mass over (x, y, z, 1), is
+//! positive definite. The distance between two bodies is the log-determinant Bregman divergence of these matrices,
+//! which does not depend on frames or units and grows without bound towards impossible bodies (Lee, Wensing and Park,
+//! Geometric robot dynamic identification, 2020).
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Vector3};
 
 use super::spatial::Inertia;
 
-/// A sum of parts of bodies, each with its factor and its place: ten to a body, in the order of [`Inertia::of_parts`].
+/// A weighted sum of body parts, each with its factor and index: ten parts per body, in the order of
+/// [`Inertia::of_parts`].
 pub(super) struct Sum {
     pub parts: Vec<(f64, usize)>,
     pub value: f64,
@@ -16,12 +18,12 @@ pub(super) struct Sum {
 
 /// Newton steps at most; a handful is usual.
 const STEPS: usize = 100;
-/// What a flat or pointlike body is thickened by, relative to its size: it has no inverse.
+/// How much a flat or pointlike body is thickened, relative to its size: its pseudo-inertia has no inverse.
 const THICKNESS: f64 = 1e-6;
 /// Squared length of the last step, in the metric of the divergence.
 const CONVERGED: f64 = 1e-20;
 
-/// The parts of the bodies nearest to `bodies` that have these sums; none where there are no such bodies.
+/// The parts of the bodies nearest to `bodies` that have these sums; none if there are no such bodies.
 pub(super) fn nearest(bodies: &[[f64; 10]], sums: &[Sum]) -> Option<Vec<[f64; 10]>> {
     let is_body: Vec<bool> = bodies.iter().map(|parts| parts[0] > 0.0).collect();
     let start: Vec<Matrix4<f64>> = bodies
@@ -105,7 +107,8 @@ fn newton_step(
         .then(|| (step.as_slice().to_vec(), length))
 }
 
-/// The solution of a symmetric system, its rows and columns scaled to like size: masses and inertias differ by orders of magnitude.
+/// The solution of a symmetric system, its rows and columns scaled to similar size: masses and inertias differ by
+/// orders of magnitude.
 fn equilibrated(mut system: DMatrix<f64>, mut wanted: DVector<f64>) -> Option<DVector<f64>> {
     let mut scales = vec![1.0; wanted.len()];
     for _ in 0..4 {

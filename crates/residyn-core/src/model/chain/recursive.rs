@@ -1,8 +1,8 @@
 //! Dynamics of a chain of any length as operations of a [`Graph`]: recursive Newton-Euler for the torques of a motion, the
 //! composite-rigid-body algorithm for the mass matrix (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6).
 //!
-//! All vectors are in the axes of the link that they belong to, whose z is its joint's axis. What the geometry makes zero
-//! or one is folded while the operations are written.
+//! All vectors are in the axes of the link that they belong to, whose z is its joint's axis. Terms that the geometry
+//! makes zero or one are folded while the operations are written.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -16,11 +16,11 @@ type Vector = [Node; 3];
 /// Where a link sits on the previous one, and how it moves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
-    /// The link's frame in that of the previous link (or the world) where its coordinate is zero; z is the axis.
+    /// The link's frame in that of the previous link (or the world) at coordinate zero; z is the axis.
     pub pose: Pose,
     /// Whether it slides along its axis rather than turning about it.
     pub slides: bool,
-    /// Its coordinate is `ratio * q + offset` (rad or m) of this joint's q.
+    /// Its coordinate is `ratio * q + offset` (rad or m), with this joint's q.
     pub joint: Joint,
     pub ratio: f64,
     pub offset: f64,
@@ -43,7 +43,7 @@ pub struct Links<'g> {
     graph: &'g mut Graph,
     links: Vec<Link>,
     joints: usize,
-    /// The acceleration that gravity stands for, in the axes of the world.
+    /// The acceleration equivalent to gravity, in the axes of the world.
     upwards: Vector,
 }
 
@@ -84,7 +84,7 @@ impl<T> Body<T> {
             .chain(&self.tensor)
     }
 
-    /// The same with every part converted.
+    /// The same body with every part converted.
     pub fn map<U>(&self, mut convert: impl FnMut(&T) -> U) -> Body<U> {
         Body {
             mass: convert(&self.mass),
@@ -114,7 +114,7 @@ impl<'g> Links<'g> {
         }
     }
 
-    /// The torques (N m) or forces (N) of a motion.
+    /// The torques (N m) or forces (N) that a motion needs.
     pub fn torques(&mut self, qd: &[Node], qdd: &[Node]) -> Vec<Node> {
         let zero = [self.graph.constant(0.0); 3];
         let mut motion = Motion {
@@ -141,7 +141,7 @@ impl<'g> Links<'g> {
         torques
     }
 
-    /// The potential energy, J: zero for the world's origin.
+    /// The potential energy, J: zero at the world's origin.
     pub fn potential(&mut self) -> Node {
         let mut upwards = self.upwards;
         let mut height = self.graph.constant(0.0);
@@ -190,7 +190,7 @@ impl<'g> Links<'g> {
 }
 
 impl Link {
-    /// The link where its joint's coordinate is `q`.
+    /// The link at joint coordinate `q`.
     fn at(graph: &mut Graph, place: &Place, body: Body<Node>, q: Node) -> Self {
         let (ratio, offset) = (graph.constant(place.ratio), graph.constant(place.offset));
         let q = graph.mul(ratio, q);
@@ -250,7 +250,7 @@ impl Link {
         // w x z qd
         let (xd, yd) = (graph.mul(angular[1], qd), graph.mul(angular[0], qd));
         if self.slides {
-            // Coriolis: twice.
+            // The Coriolis term counts twice.
             let (xd, yd) = (graph.add(xd, xd), graph.add(yd, yd));
             acceleration[0] = graph.add(acceleration[0], xd);
             acceleration[1] = graph.sub(acceleration[1], yd);
@@ -268,7 +268,7 @@ impl Link {
         }
     }
 
-    /// What moves this link's body so: Newton and Euler.
+    /// The wrench that gives this link's body its motion: Newton and Euler.
     fn needed(&self, graph: &mut Graph, motion: &Motion) -> Wrench {
         let Body { mass, moment, .. } = &self.body;
         let spin = times(graph, &self.body, &motion.angular);
@@ -287,7 +287,7 @@ impl Link {
         }
     }
 
-    /// What moves a body with a unit of acceleration of this joint alone.
+    /// The wrench that moves a body when this joint alone has unit acceleration.
     fn of_unit_acceleration(&self, graph: &mut Graph, body: &Body<Node>) -> Wrench {
         let zero = graph.constant(0.0);
         let [x, y, _] = body.moment;

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// Joints of the longest chain that is written in closed form: that of longer ones is too long to read.
+/// Joints of the longest chain that is written in closed form: equations of longer chains are too long to read.
 pub const LONGEST_CLOSED_FORM: usize = 3;
 
 /// One function of the basis: a monomial times a cosine or a sine.
@@ -67,7 +67,7 @@ impl Series {
         self
     }
 
-    /// The derivative by a joint's coordinate.
+    /// The derivative with respect to a joint's coordinate.
     pub fn derivative(&self, joint: usize) -> Self {
         let mut slope = Self::default();
         for (wave, factor) in self.terms() {
@@ -89,8 +89,8 @@ impl Series {
         slope
     }
 
-    /// Without rounding errors: terms below 1e-13 of the magnitude that `scale` gives for terms of their kind. Other
-    /// coefficients are rounded to 15 digits.
+    /// Without rounding errors: drops terms below 1e-13 of the magnitude that `scale` gives for terms of their kind.
+    /// Other coefficients are rounded to 15 digits.
     pub fn cleaned(&self, scale: impl Fn(&Wave) -> f64) -> Self {
         let kept = self
             .terms()

@@ -21,7 +21,7 @@ impl Pose {
         }
     }
 
-    /// The frame `inner`, given in this frame, in the reference frame of this one.
+    /// The frame `inner`, given in this frame, expressed in this frame's reference frame.
     #[must_use]
     pub fn then(&self, inner: &Self) -> Self {
         Self {
@@ -104,7 +104,7 @@ impl Inertia {
         here.seen_from(pose)
     }
 
-    /// The same body in the reference frame of `pose`, which is the body's frame there.
+    /// The same body in the reference frame of `pose`, which gives the body's frame there.
     #[must_use]
     pub fn seen_from(&self, pose: &Pose) -> Self {
         let (p, turned) = (pose.origin, pose.rotation * self.moment);

@@ -24,8 +24,8 @@ pub enum ValuesError {
     NoBodies,
 }
 
-/// For each joint what has to be added to its inertia, in its frame, so that the parameters of the chain's model file have
-/// these values. Of a short chain, whose parameters are sums, the bodies are taken that are nearest to the chain's.
+/// For each joint, the inertia to add, in its frame, so that the parameters of the chain's model file have these
+/// values. For a short chain, whose parameters are sums, the bodies nearest to the chain's are taken.
 ///
 /// # Errors
 /// A parameter without a value, or sums that no bodies have.
@@ -59,7 +59,7 @@ pub fn added(
     Ok(added.collect())
 }
 
-/// A difference that is rounding, relative to the largest part of a body.
+/// Differences up to this are rounding, relative to the largest part of a body.
 const ROUNDING: f64 = 1e-13;
 
 /// Mass, first moments and tensor of the body of each joint.
@@ -74,7 +74,7 @@ fn parts_of(chain: &Chain) -> Vec<[f64; 10]> {
     chain.joints.iter().map(parts).collect()
 }
 
-/// What the parameters of a short chain are sums of. A part that is zero in the file is none of them, and stays zero.
+/// The sums that make up the parameters of a short chain. A part that is zero in the file is in no sum and stays zero.
 fn sums(
     chain: &Chain,
     now: &[[f64; 10]],

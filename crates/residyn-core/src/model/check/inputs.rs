@@ -7,7 +7,7 @@ use crate::model::system::{Model, Motion};
 
 pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
     let equations = &model.equations;
-    let told = |at: Option<usize>, text: String| Finding {
+    let message = |at: Option<usize>, text: String| Finding {
         severity: Severity::Warning,
         kind: Kind::Input,
         line: at.and_then(|at| places.line(at)),
@@ -23,7 +23,7 @@ pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
                     "no acceleration uses `{tau}`: neither the torque of joint {joint} nor an effect that acts as one, such \
                      as friction, moves anything"
                 );
-                findings.push(told(Some(formulas[joint].at), text));
+                findings.push(message(Some(formulas[joint].at), text));
             }
         }
     }
@@ -38,7 +38,7 @@ pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
             if !used.contains(&command.as_str()) {
                 let text =
                     format!("no formula of [drive] uses `{command}`: that command moves nothing");
-                findings.push(told(Some(formulas[joint.index()].at), text));
+                findings.push(message(Some(formulas[joint.index()].at), text));
             }
         }
     }

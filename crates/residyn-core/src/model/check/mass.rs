@@ -9,11 +9,11 @@ use crate::data::Joint;
 use crate::decomposition::eigen;
 use crate::model::system::{Model, Motion};
 
-/// States that are drawn.
+/// Number of states drawn.
 const STATES: usize = 200;
-/// Within this share of the largest entry or eigenvalue numbers are equal, or zero.
+/// Numbers closer than this share of the largest entry or eigenvalue count as equal, or as zero.
 const ROUNDING: f64 = 1e-10;
-/// Half of a full turn, rad; joints that slide are moved by as many metres.
+/// Half a turn, rad; joints that slide move by the same number of metres.
 const REACH: f64 = std::f64::consts::PI;
 
 /// The mass matrix in a state: angles or positions, then velocities.
@@ -25,7 +25,7 @@ struct Sample {
 pub(super) fn find(model: &Model, places: &Places, rng: &mut impl Rng) -> Vec<Finding> {
     let samples = samples(model, rng);
     let faults = [not_finite, not_symmetric, not_positive];
-    // Where numbers are missing, or their mirror images differ, there are no eigenvalues to speak of.
+    // If entries are not finite, or the matrix is not symmetric, its eigenvalues mean nothing.
     let fault = faults.into_iter().find_map(|fault| fault(&samples));
     let line = match &model.equations.motion {
         Motion::MassAndBias { mass, .. } => places.line(mass[0][0].at),
@@ -56,7 +56,7 @@ fn samples(model: &Model, rng: &mut impl Rng) -> Vec<Sample> {
     states.into_iter().map(sample).collect()
 }
 
-/// States of so many joints, anywhere.
+/// Random states of this many joints, anywhere.
 pub(super) fn drawn(joints: usize, rng: &mut impl Rng) -> Vec<Vec<f64>> {
     let mut state = || {
         let values = (0..2 * joints).map(|_| rng.random_range(-REACH..REACH));
@@ -82,14 +82,14 @@ fn not_symmetric(samples: &[Sample]) -> Option<(&Sample, String)> {
     }
     let apart = (&worst.matrix - worst.matrix.transpose()).map(f64::abs);
     let (row, column) = apart.iamax_full();
-    let told = format!(
+    let message = format!(
         "is not symmetric: {:.4} in row {}, column {}, and {:.4} across the diagonal, of which only the lower is used",
         worst.matrix[(row, column)],
         row + 1,
         column + 1,
         worst.matrix[(column, row)]
     );
-    Some((worst, told))
+    Some((worst, message))
 }
 
 fn not_positive(samples: &[Sample]) -> Option<(&Sample, String)> {
@@ -110,11 +110,11 @@ fn not_positive(samples: &[Sample]) -> Option<(&Sample, String)> {
         true => "is not positive definite",
         false => "is singular",
     };
-    let told = format!("{what}: its smallest eigenvalue is {least:.3e}, its largest {most:.3e}");
-    Some((sample, told))
+    let message = format!("{what}: its smallest eigenvalue is {least:.3e}, its largest {most:.3e}");
+    Some((sample, message))
 }
 
-/// `q1 = 0, q2 = 1.571`; the velocities say something only where there are formulas of them.
+/// `q1 = 0, q2 = 1.571`; velocities matter only if formulas depend on them.
 pub(super) fn at(model: &Model, state: &[f64]) -> String {
     let angles = Joint::all(model.joints).zip(state);
     let angles = angles.map(|(joint, q)| format!("{} = {q:.4}", joint.name("q")));

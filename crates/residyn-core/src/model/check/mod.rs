@@ -25,9 +25,9 @@ const WIDTH: usize = 80;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// What is computed with this model is wrong, or cannot be computed.
+    /// Results computed with this model are wrong, or cannot be computed.
     Error,
-    /// The file says something that has no consequence, or another one than it seems.
+    /// The file says something that has no consequence, or not the one that it seems to have.
     Warning,
 }
 
@@ -39,7 +39,7 @@ pub enum Kind {
     Unused,
     /// A torque or a command that no equation uses.
     Input,
-    /// A mass matrix that no rigid bodies have.
+    /// A mass matrix that rigid bodies cannot have.
     Mass,
     /// Coriolis and centrifugal forces that do not belong to the mass matrix.
     Power,
@@ -54,7 +54,7 @@ pub enum Kind {
 pub struct Finding {
     pub severity: Severity,
     pub kind: Kind,
-    /// Where it is in the file, counted from 1; `None` where it concerns no single line.
+    /// Its line in the file, counted from 1; `None` if it concerns no single line.
     pub line: Option<usize>,
     pub text: String,
 }
@@ -71,7 +71,8 @@ pub struct Check {
 }
 
 impl Model {
-    /// Look for what cannot be meant in the file of the model. Its mass matrix is looked at in states drawn from `rng`.
+    /// Look for statements in the model's file that cannot be meant. Its mass matrix is checked in states drawn from
+    /// `rng`.
     pub fn check(&self, rng: &mut impl Rng) -> Check {
         let places = Places::of(self);
         let mut findings = [
@@ -92,7 +93,7 @@ impl Model {
         }
     }
 
-    /// Why its mass matrix is none of rigid bodies, if so: then accelerations are not finite, or no physics.
+    /// Why rigid bodies cannot have its mass matrix, if so: accelerations are then not finite, or not physical.
     pub fn mass_fault(&self) -> Option<String> {
         let found = mass::find(self, &Places::of(self), &mut crate::rng(0));
         found.into_iter().next().map(|finding| finding.text)
@@ -101,7 +102,7 @@ impl Model {
     /// Every name that these formulas mention, themselves or through intermediates.
     fn reached<'m>(&'m self, names: impl IntoIterator<Item = &'m str>) -> HashSet<&'m str> {
         let mut reached: HashSet<&str> = names.into_iter().collect();
-        // An intermediate uses earlier ones alone.
+        // An intermediate uses only earlier ones.
         for (name, formula) in self.equations.lets.iter().rev() {
             if reached.contains(name.as_str()) {
                 reached.extend(formula.value.names());
@@ -122,7 +123,7 @@ impl fmt::Display for Finding {
 }
 
 impl fmt::Display for Check {
-    /// The model in a line, then the findings; no line is longer than 80 characters, but for a word that is.
+    /// The model in one line, then the findings; no line is longer than 80 characters, unless a single word is.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             name,

@@ -6,7 +6,7 @@ use crate::expr::is_function;
 use crate::model::effect::{COUPLING_NAMES, EFFECT_NAMES};
 use crate::model::system::Model;
 
-/// What joints have, by a number each.
+/// Quantities of joints, named with the joint's number.
 const NUMBERED: [&str; 6] = ["q", "qd", "qdd", "tau", "cmd", "load"];
 
 pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
@@ -49,7 +49,7 @@ fn taken_for(name: &str) -> Option<String> {
     }
 }
 
-/// Parameters of the k-th effect whose names the declared ones have taken.
+/// Parameters of the k-th effect whose names are taken by declared ones.
 fn renamed(model: &Model, k: usize) -> Vec<String> {
     let effect = &model.effects[k];
     let own: Vec<&str> = model.own_names().collect();

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::model::reader::{Document, Section};
 use crate::model::system::Model;
 
-/// The file's text, and where in it things are, bytes.
+/// The file's text, and the byte offsets of its entries.
 pub(super) struct Places {
     document: Document,
     parameters: HashMap<String, usize>,
@@ -34,7 +34,7 @@ impl Places {
         places
     }
 
-    /// The line of a byte of the text.
+    /// The line of a byte offset in the text.
     pub fn line(&self, at: usize) -> Option<usize> {
         self.document.error(at, "").place.map(|(line, _)| line)
     }
@@ -47,13 +47,13 @@ impl Places {
         self.line(*self.intermediates.get(name)?)
     }
 
-    /// The k-th effect.
+    /// The line of the k-th effect.
     pub fn effect(&self, k: usize) -> Option<usize> {
         self.line(*self.effects.get(k)?)
     }
 }
 
-/// The places of what a section has, by name.
+/// The places of a section's entries, by name.
 fn all(section: Option<Section<'_>>) -> HashMap<String, usize> {
     let places = section.iter().flat_map(|section| section.places());
     places.map(|(key, at)| (key.to_owned(), at)).collect()

@@ -9,11 +9,11 @@ use super::places::Places;
 use super::{Finding, Kind, Severity};
 use crate::model::system::{Model, Motion};
 
-/// How far joints move along their velocities for the slope of the mass matrix \[s\].
+/// How long joints move along their velocities to find the slope of the mass matrix \[s\].
 const STEP_S: f64 = 1e-5;
-/// A difference below this share of either power is that of numerical slopes, or of rounded numbers in the file.
+/// A difference below this share of either power comes from numerical slopes, or from rounded numbers in the file.
 const SAME: f64 = 1e-3;
-/// Both powers are nothing below this share of the kinetic energy, per second.
+/// Below this share of the kinetic energy, per second, both powers count as zero.
 const NOTHING: f64 = 1e-6;
 
 /// The two powers in a state \[W\].
@@ -25,7 +25,7 @@ struct Powers {
 }
 
 impl Powers {
-    /// The difference as a share of the larger; 0 where both are nothing.
+    /// The difference as a share of the larger; 0 if both count as zero.
     fn apart(&self) -> f64 {
         let largest = self.of_mass.abs().max(self.of_bias.abs());
         match largest > NOTHING * self.energy {
@@ -74,7 +74,7 @@ fn powers(model: &Model, rng: &mut impl Rng) -> Vec<Powers> {
         let mass_at = |by: f64| mass_and_bias(&moved(by), qd).0;
         let slope = (mass_at(STEP_S) - mass_at(-STEP_S)) / (2.0 * STEP_S);
         let back: Vec<f64> = qd.iter().map(|qd| -qd).collect();
-        // Friction changes its sign with the velocity, gravity is there without.
+        // Friction changes sign with the velocity; gravity acts at rest, too.
         let bias_at = |qd: &[f64]| mass_and_bias(q, qd).1;
         let even = 0.5 * (bias_at(qd) + bias_at(&back)) - bias_at(&vec![0.0; n]);
         let (mass, qd) = (mass_at(0.0), DVector::from_column_slice(qd));

@@ -1,7 +1,8 @@
 //! Units that do not fit, where they are declared.
 //!
-//! Exact where it says something: what a number takes part in has no known unit, since lengths are numbers in formulas that were
-//! derived from a drawing, and neither has a command or a parameter without `unit`. Angles are pure numbers.
+//! Exact where it reports anything: a term that contains a plain number has no known unit, since lengths are numbers in
+//! formulas that were derived from a drawing, and neither has a command or a parameter without `unit`. Angles are pure
+//! numbers.
 
 use std::collections::HashMap;
 
@@ -13,7 +14,7 @@ use crate::model::effect::{Effect, Entry};
 use crate::model::reader::Located;
 use crate::model::system::{Model, Motion};
 
-/// Names and their units, where they have one.
+/// Names and their units, if they have one.
 type Names = HashMap<String, Option<Unit>>;
 
 pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
@@ -34,12 +35,12 @@ pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
     units.findings
 }
 
-/// A unit as it is written here.
+/// A unit as written in this code.
 fn unit(text: &str) -> Unit {
     Unit::parse(text).expect("an SI unit").without_angle()
 }
 
-/// The unit that a file declares; none where it declares none, or one that is not known.
+/// The unit that a file declares; none if it declares none, or an unknown one.
 fn declared(text: &str) -> Option<Unit> {
     Unit::parse(text).map(Unit::without_angle)
 }
@@ -146,7 +147,7 @@ impl Units<'_> {
         }
     }
 
-    /// Both may be relative to an inertia: they have to fit each other.
+    /// Both may be relative to an inertia: they only have to fit each other.
     fn energy(&mut self, model: &Model) {
         if let Some(energy) = &model.equations.energy
             && let Some(total) = self.of(&energy.total)
@@ -190,7 +191,7 @@ impl Units<'_> {
 }
 
 impl Units<'_> {
-    /// The unit of a formula of the declared equations, whose misfits are told.
+    /// The unit of a formula of the declared equations, whose misfits are reported.
     fn of(&mut self, formula: &Located<Formula>) -> Option<Unit> {
         let names = std::mem::take(&mut self.names);
         let unit = self.unit(&formula.value, self.places.line(formula.at), &names);
@@ -198,7 +199,7 @@ impl Units<'_> {
         unit
     }
 
-    /// A formula of the declared equations whose value has this unit.
+    /// A formula of the declared equations whose value should have this unit.
     fn expect(&mut self, what: &str, formula: &Located<Formula>, wanted: Unit) {
         let names = std::mem::take(&mut self.names);
         let line = self.places.line(formula.at);

@@ -35,7 +35,7 @@ pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
         let line = places.parameter(&parameter.name);
         Some(finding(line, unused(&parameter.name)?))
     });
-    // What an energy is written with need not occur in the equations of motion.
+    // Intermediates of an energy need not occur in the equations of motion.
     let lets = equations.lets.iter().map(|(name, _)| name.as_str());
     let of_lets = lets
         .filter(|name| !in_energy.contains(name))

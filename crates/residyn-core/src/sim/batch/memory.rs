@@ -24,7 +24,7 @@ impl Memory {
         if equations.filters.is_empty() {
             return None;
         }
-        // The first command is taken as held for ever before, so the impulse is the second.
+        // The first command counts as held for ever before, so the impulse is the second.
         let mut impulse = Log::empty(equations.joints);
         impulse.time = (0..MOST_STEPS + 2).map(|row| step_s * row as f64).collect();
         let mut tau = vec![0.0; impulse.rows()];

@@ -18,5 +18,5 @@ use crate::lanes::Row;
 /// Rows of a batch that are evaluated together, one in each lane.
 pub const W: usize = 32;
 
-/// One value for each of these rows.
+/// One value per row.
 pub type Rows = Row<f32, W>;

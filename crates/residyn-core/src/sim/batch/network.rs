@@ -9,7 +9,7 @@ use super::product::{Finish, Product};
 #[derive(Debug, Clone)]
 pub struct Network {
     pub(super) layers: Vec<Layer>,
-    /// Layer after layer, the weights `[output][input]` before the biases.
+    /// Layer by layer, the weights `[output][input]` before the biases.
     pub(super) numbers: Vec<f32>,
     /// The weights alone, `[input][output]`.
     transposed: Vec<f32>,
@@ -34,7 +34,7 @@ impl Network {
     /// [`MlpWeights::flat`](crate::model::MlpWeights::flat).
     ///
     /// # Panics
-    /// When the count of numbers does not follow from the widths.
+    /// When the count of numbers does not match the widths.
     pub fn new(widths: &[usize], numbers: &[f32]) -> Self {
         let mut layers: Vec<Layer> = Vec::with_capacity(widths.len());
         let (mut number, mut turned, mut value) = (0, 0, 0);
@@ -65,7 +65,7 @@ impl Network {
     /// Replace all weights and biases.
     ///
     /// # Panics
-    /// When the count of numbers is another.
+    /// When the count of numbers differs.
     pub fn set_numbers(&mut self, numbers: &[f32]) {
         self.numbers.copy_from_slice(numbers);
         for layer in &self.layers {
@@ -76,10 +76,10 @@ impl Network {
     }
 
     /// Replace all weights and biases by `numbers` in another order: each layer's weights `[input][output]`, as Burn's
-    /// linear layers have them.
+    /// linear layers store them.
     ///
     /// # Panics
-    /// When the count of numbers is another.
+    /// When the count of numbers differs.
     pub fn set_by_input(&mut self, numbers: &[f32]) {
         assert_eq!(numbers.len(), self.numbers.len(), "one for each number");
         for layer in &self.layers {
@@ -149,7 +149,7 @@ impl Network {
     }
 }
 
-/// The transpose of a matrix, row after row, with so many columns.
+/// The transpose of a row-major matrix with `columns` columns.
 fn transpose(matrix: &[f32], columns: usize, to: &mut [f32]) {
     let rows = matrix.len() / columns;
     for (k, row) in matrix.chunks_exact(columns).enumerate() {

@@ -28,7 +28,7 @@ impl Product<'_> {
     #[inline(always)]
     pub fn run<S: Simd>(self, simd: S, from: &[Rows], to: &mut [Rows]) {
         let mut first = 0;
-        // The accumulators stay in registers: eight outputs with two registers each where there are 32 registers.
+        // The accumulators stay in registers: eight outputs with two registers each if there are 32 registers.
         if S::REGISTER_COUNT >= 32 {
             while to.len() - first >= 8 {
                 self.tile::<S, 8>(simd, first, from, to);

@@ -15,7 +15,7 @@ pub struct Rollouts {
     program: Program,
     parameters: Vec<f32>,
     networks: Vec<Added>,
-    /// Present where the equations filter their torques.
+    /// Present if the equations filter their torques.
     memory: Option<Memory>,
     integrator: Integrator,
     step_s: f32,
@@ -48,11 +48,11 @@ pub struct Block<'r> {
 impl Rollouts {
     /// `equations` with the outputs of `networks` added to their derivative, in steps of `step_s` seconds, under an
     /// objective whose only output is the reward of the state at the end of a step. Its inputs are `q`, `qd` and the
-    /// commanded `tau` of every joint, and `t`. Where the equations filter their torques, the mean filtered torque acts
+    /// commanded `tau` of every joint, and `t`. If the equations filter their torques, the mean filtered torque acts
     /// over each step.
     ///
     /// # Panics
-    /// When a network or the objective does not belong to their joints.
+    /// When a network or the objective does not match their joints.
     #[allow(clippy::cast_possible_truncation)] // planning runs in f32
     pub fn new(
         equations: &Dynamics,
@@ -167,10 +167,10 @@ impl Block<'_> {
 
     /// The sum of rewards of each rollout from `start` (positions, then velocities) at `time_s` under `inputs`
     /// (`[step * n + joint]`), each held for a step; `carried` is what earlier torques add to the acting ones, see
-    /// [`Rollouts::carried`]. NaN or infinite where a rollout diverges.
+    /// [`Rollouts::carried`]. NaN or infinite if a rollout diverges.
     ///
     /// # Panics
-    /// When `start` or `inputs` is not of the model's size.
+    /// When `start` or `inputs` does not have the model's size.
     pub fn returns(
         &mut self,
         start: &[f32],

@@ -33,7 +33,7 @@ fn network(joints: usize, angles: Angles, on: ResidualOn) -> MlpWeights {
     MlpWeights::new(joints, &settings, scaling, LastLayer::Random, &mut rng)
 }
 
-/// The returns of one block by the engine, and one after the other in f64.
+/// The returns of one block from the engine, and computed one by one in f64.
 fn both(equations: &Dynamics, networks: &[MlpWeights], integrator: Integrator) -> [Vec<f64>; 2] {
     let n = equations.joints;
     let reward = "cos(q1) - 0.1 * tau1^2 + 0.01 * qd1 * t";
@@ -221,7 +221,7 @@ fn torques_are_filtered_as_everywhere_else() {
     }
 }
 
-/// The return of one sequence in f64, under the torques that [`Commands`] let act.
+/// The return of one sequence in f64, with the acting torques from [`Commands`].
 fn filtered_return(
     model: &Dynamics,
     objective: &Objective,
@@ -274,7 +274,7 @@ fn what_lies_beyond_the_memory_does_not_matter() {
         rollouts.carried(&past, STEPS),
         rollouts.carried(forgotten, STEPS)
     );
-    // However slow, a filter lets all of a constant torque act.
+    // However slow, a filter passes a constant torque in full.
     let slow = filtered("pendulum", &[("actuator_lag", 0, 1000.0)]);
     let carried = filtered_rollouts(&slow, &objective).carried(&[vec![1.0]], 1);
     assert!((carried[0] - 1.0).abs() < 1e-4, "{carried:?}");

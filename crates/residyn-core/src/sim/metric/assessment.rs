@@ -9,11 +9,11 @@ pub struct WindowError {
     pub start_s: f64,
     /// Rows that were compared.
     pub rows: usize,
-    /// Sum over the rows of the squared position error, one a joint.
+    /// Sum over the rows of the squared position error, one per joint.
     pub position: Vec<f64>,
-    /// Sum over the rows of the squared velocity error, one a joint.
+    /// Sum over the rows of the squared velocity error, one per joint.
     pub velocity: Vec<f64>,
-    /// The model left every sensible range; the errors are what it had reached by then, held.
+    /// The prediction left every sensible range; its state is held at the limit, so that errors stay finite.
     pub diverged: bool,
 }
 
@@ -36,7 +36,7 @@ pub struct Assessment {
 }
 
 impl Assessment {
-    /// The horizon by which models are compared in one number.
+    /// The horizon at which models are compared by a single number.
     pub fn middle(&self) -> &OpenLoop {
         &self.horizons[self.horizons.len() / 2]
     }

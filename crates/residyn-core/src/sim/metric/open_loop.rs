@@ -20,10 +20,10 @@ const STEP_TOLERANCE: f64 = 1e-3;
 /// Substeps are halved down to this, in s.
 const SHORTEST_STEP_S: f64 = PREDICTION_S / 64.0;
 
-/// The open-loop error of `dynamics` on `logs`, with the values that each log has of its own.
+/// The open-loop error of `dynamics` on `logs`, with the per-log values of each log.
 ///
-/// Windows start every half horizon and last one; their start states come from the log alone. The
-/// logged torque is held over each step.
+/// Windows start every half horizon and last one horizon; their start states come from the log alone. The logged torque
+/// is held over each step.
 pub fn assess(dynamics: &Dynamics, logs: &[Log], horizons_s: &[f64]) -> Assessment {
     let models: Vec<Cow<'_, Dynamics>> = logs.iter().map(|log| dynamics.in_log(log)).collect();
     let mut step_s = PREDICTION_S;
@@ -63,8 +63,7 @@ fn run(
     horizons_s.iter().map(one).collect()
 }
 
-/// The errors of a model in some windows of the logs, which are in the order of the logs, in substeps of at most
-/// `step_s`.
+/// The errors of a model in some windows, sorted by log, in substeps of at most `step_s`.
 pub fn errors_in(
     dynamics: &Dynamics,
     logs: &[Log],
@@ -83,7 +82,7 @@ fn replays<'l>(models: &'l [Cow<'l, Dynamics>], logs: &'l [Log]) -> Vec<Replay<'
         .collect()
 }
 
-/// `replays` has one entry a log.
+/// `replays` has one entry per log.
 fn errors(replays: &[Replay<'_>], windows: &[Window], step_s: f64) -> Vec<WindowError> {
     let packs: Vec<&[Window]> = windows
         .chunk_by(|a, b| a.log == b.log)
@@ -128,8 +127,8 @@ pub fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
         .collect()
 }
 
-/// The times at which windows start: every half horizon, as long as a horizon fits into the log. Those that no row
-/// follows within a horizon are passed over, so that a clock that jumps by years costs no time.
+/// The times at which windows start: every half horizon, as long as a horizon fits into the log. Starts that no row
+/// follows within a horizon are skipped, so that a clock that jumps by years costs no time.
 fn starts(log: &Log, begin: f64, horizon_s: f64) -> impl Iterator<Item = f64> {
     let half = horizon_s / 2.0;
     let end_of_log = log.time[log.rows() - 1] + SAME_S;
@@ -151,7 +150,8 @@ struct Replay<'l> {
     model: Point<'l>,
     commands: Commands<'l>,
     log: &'l Log,
-    /// The log with the rig's own angles, from which start states are estimated, and half of the time that tells them, s.
+    /// The log with the rig's own angles, from which start states are estimated, and half the time span of that
+    /// estimate, s.
     own: Cow<'l, Log>,
     half_width_s: f64,
 }

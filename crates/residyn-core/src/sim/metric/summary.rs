@@ -18,7 +18,7 @@ pub struct Summary {
     pub diverged: Vec<usize>,
 }
 
-/// Summarise the windows of each horizon. A horizon without windows has zero errors and a zero count of windows.
+/// Summarise the windows of each horizon. A horizon without windows has zero errors and a window count of zero.
 pub fn summarise(horizons: &[OpenLoop], joints: usize) -> Summary {
     let per_joint = |f: &dyn Fn(&OpenLoop, usize) -> f64| -> Vec<Vec<f64>> {
         horizons

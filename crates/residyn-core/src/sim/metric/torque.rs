@@ -17,17 +17,17 @@ const LANES: usize = 8;
 pub struct TorqueError {
     /// Root mean square of each joint, N m (or N).
     pub rms: Vec<f64>,
-    /// The norm of all differences over that of all logged torques; infinite, in files null, where these are zero.
+    /// The norm of all differences relative to that of all logged torques; infinite (null in files) if these are zero.
     #[serde(deserialize_with = "infinite_where_null")]
     #[schemars(with = "Option<f64>")]
     pub relative: f64,
-    /// Squares of the differences of all joints, summed over stretches of two seconds of each log.
+    /// Squares of the differences of all joints, summed over blocks of two seconds of each log.
     #[serde(skip)]
-    pub stretches: Vec<f64>,
+    pub blocks: Vec<f64>,
 }
 
 impl TorqueError {
-    /// `relative` in percent; in words where there is no such share.
+    /// `relative` in percent; in words if there is no such share.
     pub fn share(&self) -> String {
         match self.relative.is_finite() {
             true => format!("{:.2} %", 100.0 * self.relative),
@@ -44,8 +44,8 @@ fn infinite_where_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Err
 /// Errors are taken as independent beyond this time, s.
 const STRETCH_S: f64 = 2.0;
 
-/// The error of the torques on logs, each as [`Smooth`] reads it. `None` for a model that gives accelerations, and where no
-/// log is longer than a second.
+/// The torque error on logs, each smoothed by [`Smooth`]. `None` for a model that gives accelerations, and if no log is
+/// longer than a second.
 pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
     let balance = model.torque_balance()?;
     let differences = logs.par_iter().map(|log| differences(&balance, log));
@@ -56,7 +56,7 @@ pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
     sums.error()
 }
 
-/// Where the torques that a model needs for the motion of logs first are no finite numbers: the log, and the time in s.
+/// Where the torques that a model needs for the logged motion are first not finite: the log, and the time in s.
 pub fn torques_leave(model: &Model, logs: &[Log]) -> Option<(String, f64)> {
     logs.iter().find_map(|log| {
         let NeededTorques { time, needed, .. } = needed_torques(model, log)?;
@@ -66,7 +66,7 @@ pub fn torques_leave(model: &Model, logs: &[Log]) -> Option<(String, f64)> {
     })
 }
 
-/// The torques of a log and those that its motion needs, low-passed.
+/// The torques of a log and those that its motion needs, low-pass filtered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeededTorques {
     /// s
@@ -76,7 +76,7 @@ pub struct NeededTorques {
     pub needed: Vec<Vec<f64>>,
 }
 
-/// What the motion of a log needs by a model; `None` for a model that gives accelerations.
+/// The torques that a log's motion needs according to a model; `None` for a model that gives accelerations.
 pub fn needed_torques(model: &Model, log: &Log) -> Option<NeededTorques> {
     let (smooth, differences) = differences(&model.torque_balance()?, log);
     let logged = smooth.tau.iter();
@@ -92,7 +92,7 @@ pub fn needed_torques(model: &Model, log: &Log) -> Option<NeededTorques> {
     })
 }
 
-/// Of a log, and the torques by which its motion needs more than acts, `[joint][row]`.
+/// A log, smoothed, and the torques that its motion needs beyond those that act, `[joint][row]`.
 fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
     let in_log = balance.in_log(log);
     let logged = Smooth::of(log);
@@ -102,7 +102,7 @@ fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
     (logged, found)
 }
 
-/// What a balance of torques gives along a smoothed motion and its torques, `[joint][row]`.
+/// The values of a torque balance along a smoothed motion with its torques, `[joint][row]`.
 pub(crate) fn balance_of(balance: &Dynamics, acting: &Smooth) -> Vec<Vec<f64>> {
     let values = balance.values();
     let mut tape = balance.program.tape::<f64, LANES>();
@@ -141,7 +141,7 @@ pub(crate) fn balance_of(balance: &Dynamics, acting: &Smooth) -> Vec<Vec<f64>> {
 
 /// Sums of squares.
 struct Sums {
-    stretches: Vec<f64>,
+    blocks: Vec<f64>,
     differences: Vec<f64>,
     torques: f64,
     rows: usize,
@@ -150,7 +150,7 @@ struct Sums {
 impl Sums {
     fn new(joints: usize) -> Self {
         Self {
-            stretches: Vec::new(),
+            blocks: Vec::new(),
             differences: vec![0.0; joints],
             torques: 0.0,
             rows: 0,
@@ -163,11 +163,11 @@ impl Sums {
             *sum += squares(differences);
         }
         let start = logged.time.first().copied().unwrap_or(0.0);
-        let stretch = |row: &usize| ((logged.time[*row] - start) / STRETCH_S).floor();
+        let block = |row: &usize| ((logged.time[*row] - start) / STRETCH_S).floor();
         let rows: Vec<usize> = (0..logged.rows()).collect();
-        for of_stretch in rows.chunk_by(|a, b| stretch(a) == stretch(b)) {
+        for of_block in rows.chunk_by(|a, b| block(a) == block(b)) {
             let square = |row: &usize| differences.iter().map(|of| of[*row].powi(2)).sum::<f64>();
-            self.stretches.push(of_stretch.iter().map(square).sum());
+            self.blocks.push(of_block.iter().map(square).sum());
         }
         self.torques += logged.tau.iter().map(squares).sum::<f64>();
         self.rows += logged.rows();
@@ -182,7 +182,7 @@ impl Sums {
                 .map(|sum| (sum / self.rows as f64).sqrt())
                 .collect(),
             relative: (all / self.torques).sqrt(),
-            stretches: self.stretches,
+            blocks: self.blocks,
         })
     }
 }

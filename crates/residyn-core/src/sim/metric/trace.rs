@@ -19,7 +19,7 @@ pub fn traces(dynamics: &Dynamics, log: &Log, horizon_s: f64) -> Vec<Trace> {
     let commands = Commands::of_log(&model, log);
     let own = with_own_angles(&model, log);
     let half_width = half_width_s(log.median_step());
-    // The windows of the error overlap by half: every second one covers the log once.
+    // The windows of the error overlap by half: every second window covers the log once.
     super::open_loop::windows(0, log, horizon_s)
         .iter()
         .step_by(2)

@@ -18,7 +18,7 @@ pub struct Experiment {
     pub task: PathBuf,
     /// Number of consecutive seeds (of initial states, sensor noise and plans) in each case.
     pub seeds: u64,
-    /// Numbers of episodes on whose logs models are closed and trained, rising.
+    /// Numbers of episodes on whose logs models are closed and trained, in ascending order.
     pub episodes: Vec<usize>,
     /// The plants: what each has that the declared model lacks.
     #[serde(rename = "case")]

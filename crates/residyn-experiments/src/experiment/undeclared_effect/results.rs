@@ -50,7 +50,7 @@ pub struct Compared {
     pub deviation: f64,
     /// Number of episodes in which the goal was held until the end.
     pub successes: usize,
-    /// None for the declared and the true model, and where nothing is lost.
+    /// None for the declared and the true model, and if nothing is lost.
     pub won_back: Option<Recovered>,
 }
 
@@ -93,7 +93,7 @@ impl Results {
         )
     }
 
-    /// What each model that learns wins back of the lost return.
+    /// The share of the lost return that each learning model wins back.
     pub fn shares(&self) -> Vec<Share> {
         let share = |case: &CaseResults, model: &Compared| {
             let Recovered { share, ci95 } = model.won_back?;
@@ -158,7 +158,7 @@ impl CaseResults {
         }
     }
 
-    /// The share that the closed model wins back after this number of episodes; none where nothing is lost.
+    /// The share that the closed model wins back after this number of episodes; `None` if nothing is lost.
     fn share(&self, episodes: usize) -> Option<f64> {
         let is_it = |m: &&Compared| m.model == PlanningModel::Closed && m.episodes == episodes;
         let model = self.models.iter().find(is_it)?;
@@ -208,7 +208,7 @@ impl Compared {
         }
     }
 
-    /// The model, with how much it learnt from.
+    /// The model, with the number of episodes it learnt from.
     fn name(&self) -> String {
         match self.episodes {
             0 => self.model.name().to_owned(),

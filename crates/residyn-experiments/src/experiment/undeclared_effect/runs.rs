@@ -27,7 +27,7 @@ impl Session {
         Ok(Results::new(&self.experiment, &trials))
     }
 
-    /// Carries out a shard of the trials, as [`Session::run`] does all.
+    /// As [`Session::run`], for a shard of the trials.
     ///
     /// # Errors
     /// As [`Session::run`].
@@ -56,7 +56,7 @@ impl Session {
         })
     }
 
-    /// What decides the numbers of all trials together.
+    /// What determines the numbers of all trials together.
     pub fn run_of_all(&self) -> Identity {
         let Identity { config, .. } = self.identity();
         let Experiment { cases, seeds, .. } = &self.experiment;

@@ -26,7 +26,7 @@ impl Session {
     /// Reads everything that the experiment refers to. The seeds are `first_seed` and those that follow.
     ///
     /// # Errors
-    /// Files that are missing or not of the declared system.
+    /// Files that are missing or do not belong to the declared system.
     pub fn new(
         experiment: Experiment,
         library: Library,

@@ -174,7 +174,7 @@ impl Session {
         }
     }
 
-    /// The log of an episode with an initial state and random numbers of its own.
+    /// The log of an episode with its own initial state and random numbers.
     fn gather(
         &self,
         evaluator: Evaluator<'_>,

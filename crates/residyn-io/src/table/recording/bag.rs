@@ -10,7 +10,7 @@ use rusqlite::{Connection, OpenFlags};
 use super::Recording;
 use residyn_core::data::LogError;
 
-/// How a message begins that rosbag2 has compressed on its own.
+/// The first bytes of a message that rosbag2 has compressed separately.
 const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
 pub(super) fn read(path: &Path, recording: &mut Recording) -> Result<(), LogError> {
@@ -56,11 +56,11 @@ fn add(path: &Path, recording: &mut Recording) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Bytes that a message takes at least.
+/// Fewest bytes that a message takes.
 const LEAST: u64 = 4;
 
 /// Counts the messages of the topics that are not read. Pages of a damaged file can refer to each other in circles, and
-/// then hold messages without an end.
+/// then yield messages without end.
 fn count(
     bag: &Connection,
     topics: &HashMap<i64, usize>,
@@ -83,7 +83,7 @@ fn count(
     Ok(())
 }
 
-/// A view in place of a table, or a column that is computed, can have any number of rows and bytes.
+/// A view in place of a table, or a computed column, can have any number of rows and bytes.
 fn check_tables(bag: &Connection) -> Result<(), Box<dyn Error>> {
     for table in ["topics", "messages"] {
         let stored = "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = ?1 AND rootpage > 0";

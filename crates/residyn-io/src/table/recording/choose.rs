@@ -25,7 +25,7 @@ impl Recording {
         let has_joints = |series: &&&Series| columns.has_angles_in(&series.short_names());
         let fitting: Vec<&Series> = states.iter().filter(has_joints).copied().collect();
         let (those, fault) = match fitting.is_empty() {
-            // Of a single topic, the missing column is told.
+            // For a single topic, the missing column is reported.
             true => (states, "no topic has all joints of the model"),
             false => (fitting, "several topics have the joints"),
         };
@@ -37,7 +37,7 @@ impl Recording {
         let name = &self.topics[most.topic].name;
         Err(self.fault(format!(
             "{fault}; say which under [columns] in the model file: topic = {name:?}. It has {}",
-            self.told()
+            self.message()
         )))
     }
 
@@ -49,12 +49,12 @@ impl Recording {
             "there is no topic{} with joint states, sensor_msgs/msg/JointState in CDR or JSON{fault}; record one, or choose \
              another by topic = \"NAME\" under [columns] in the model file. It has {}",
             of_topic.unwrap_or_default(),
-            self.told()
+            self.message()
         ))
     }
 
-    /// The topics, their types, numbers of messages, and joints; of many the first.
-    fn told(&self) -> String {
+    /// The topics, their types, numbers of messages, and joints; if there are many, the first.
+    fn message(&self) -> String {
         let mut joints: HashMap<usize, BTreeSet<&str>> = HashMap::new();
         for series in &self.series {
             joints
@@ -62,7 +62,7 @@ impl Recording {
                 .or_default()
                 .extend(series.joints());
         }
-        let told = |(index, topic): (usize, &Topic)| {
+        let message = |(index, topic): (usize, &Topic)| {
             let joints = match joints.get(&index) {
                 Some(joints) if !joints.is_empty() => {
                     format!(": {}", listed(joints.iter().copied()))
@@ -74,7 +74,7 @@ impl Recording {
             format!("{name} ({kind}, {messages} messages{joints})")
         };
         let topics = self.topics.iter().enumerate().take(MOST_TOLD);
-        let topics: Vec<String> = topics.map(told).collect();
+        let topics: Vec<String> = topics.map(message).collect();
         let more = match self.topics.len().saturating_sub(MOST_TOLD) {
             0 => String::new(),
             more => format!(" and {more} more"),
@@ -86,5 +86,5 @@ impl Recording {
     }
 }
 
-/// Topics that a message lists.
+/// Most topics that a message lists.
 const MOST_TOLD: usize = 20;

@@ -56,7 +56,7 @@ fn add(path: &Path, recording: &mut Recording) -> McapResult<()> {
                 let read = file.read(reader.insert(size))?;
                 reader.notify_read(read);
             }
-            // What follows is an index.
+            // An index follows.
             LinearReadEvent::Record { opcode, .. } if opcode == op::DATA_END => break,
             LinearReadEvent::Record { opcode, data } => {
                 if recording.unpacked.take(data.len() as u64).is_err() {
@@ -74,13 +74,14 @@ fn add(path: &Path, recording: &mut Recording) -> McapResult<()> {
     Ok(())
 }
 
-/// Whether the texts of a record are no longer than the record, for which memory is taken before they are read.
+/// Whether the texts of a record are no longer than the record, since memory is allocated for them before they are
+/// read.
 fn is_whole(opcode: u8, data: &[u8]) -> bool {
     let are_whole = |data, count| fields(data).take(count).all(|field| field.is_some());
     match opcode {
-        // Behind its number: name, encoding, definition.
+        // After its number: name, encoding, definition.
         op::SCHEMA => data.get(2..).is_some_and(|data| are_whole(data, 3)),
-        // Behind the numbers of channel and schema: topic, encoding, texts about them.
+        // After the numbers of channel and schema: topic, encoding, texts about them.
         op::CHANNEL => data.get(4..).is_some_and(|data| {
             let about = fields(data).nth(2).flatten().unwrap_or_default();
             are_whole(data, 3) && are_whole(about, usize::MAX)
@@ -89,7 +90,7 @@ fn is_whole(opcode: u8, data: &[u8]) -> bool {
     }
 }
 
-/// Fields that have their lengths before them; `None`, and nothing behind it, where one is longer than what is there.
+/// Fields preceded by their lengths; `None`, and nothing after it, if a field is longer than the data.
 fn fields(mut data: &[u8]) -> impl Iterator<Item = Option<&[u8]>> {
     std::iter::from_fn(move || {
         if data.is_empty() {

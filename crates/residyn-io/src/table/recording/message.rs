@@ -4,22 +4,22 @@ use re_cdr::{BigEndian, LittleEndian, from_bytes};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-/// The numbers of a message: `elbow/position` of joint states, `1`, `2` .. of an array.
+/// The numbers of a message: `elbow/position` for joint states, `1`, `2` .. for an array.
 #[derive(Debug)]
 pub(super) struct Message {
-    /// \[ns\]; 0 where the message has none.
+    /// \[ns\]; 0 if the message has none.
     pub stamp_ns: i64,
     pub names: Vec<String>,
     pub values: Vec<f64>,
 }
 
-/// What stands behind a joint's name, and the stem of the standard names.
+/// Suffixes of joint names, and the stems of the standard names.
 pub(super) const CHANNELS: [(&str, &str); 3] =
     [("/position", "q"), ("/velocity", "qd"), ("/effort", "tau")];
 
 pub(super) type Decoder = fn(&[u8]) -> Result<Message, String>;
 
-/// What decodes messages of a type, such as `sensor_msgs/msg/JointState`; `None` for those that are not read.
+/// The decoder for messages of a type, such as `sensor_msgs/msg/JointState`; `None` for types that are not read.
 pub(super) fn decoder(kind: &str, encoding: &str) -> Option<Decoder> {
     let name = kind.rsplit(['/', '.']).next().unwrap_or(kind);
     match (name, encoding) {
@@ -92,7 +92,7 @@ struct JointState {
 }
 
 impl Numbers for JointState {
-    /// An array is empty where the driver has nothing to say.
+    /// An array is empty if the driver does not report that quantity.
     fn numbers(self) -> Result<Message, String> {
         let arrays = [self.position, self.velocity, self.effort];
         let (mut names, mut values) = (Vec::new(), Vec::new());
@@ -226,7 +226,7 @@ mod tests {
             (message.names, message.values),
             (vec!["1".to_owned(), "2".to_owned()], vec![1.5, -2.0])
         );
-        // Announced are more than there are.
+        // More numbers are announced than there are.
         assert!(read(&encoded(&[0, 0, 3, 0], &[1.5, -2.0])).is_err());
         assert!(read(&encoded(&[0, 0, u32::MAX, 0], &[1.5])).is_err());
         assert_eq!(

@@ -12,7 +12,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use self::message::{CHANNELS, Decoder, Message};
-use super::room::Room;
+use super::budget::Budget;
 use residyn_core::data::Arrays;
 use residyn_core::data::Columns;
 use residyn_core::data::LogError;
@@ -21,7 +21,7 @@ use residyn_core::limits::MESSAGE_BYTES;
 /// The table of a rosbag2 in SQLite.
 ///
 /// # Errors
-/// A file that is none, and as [`Recording::table`].
+/// A file that is not a rosbag2, and as [`Recording::table`].
 pub(super) fn of_bag(path: &Path, columns: &Columns) -> Result<Arrays, LogError> {
     let mut recording = Recording::of(path);
     bag::read(path, &mut recording)?;
@@ -41,7 +41,7 @@ pub(super) fn of_mcap(path: &Path, columns: &Columns) -> Result<Arrays, LogError
 /// The table of a folder of rosbag2, whose files follow each other.
 ///
 /// # Errors
-/// A folder without such files, and as those of the files.
+/// A folder without such files, and the errors of its files.
 pub(super) fn of_folder(path: &Path, columns: &Columns) -> Result<Arrays, LogError> {
     let mut recording = Recording::of(path);
     folder::read(path, &mut recording)?;
@@ -58,9 +58,9 @@ struct Recording {
     /// The indices of the series by topic and names.
     series_by_names: HashMap<(usize, Vec<String>), usize>,
     notes: Vec<String>,
-    /// For what is packed in the files, and for what is kept of it.
-    unpacked: Room,
-    kept: Room,
+    /// For what is unpacked from the files, and for what is kept of it.
+    unpacked: Budget,
+    kept: Budget,
 }
 
 struct Topic {
@@ -82,13 +82,13 @@ struct Series {
 
 struct Sample {
     logged_ns: i64,
-    /// 0 where the message has none.
+    /// 0 if the message has none.
     stamp_ns: i64,
     values: Vec<f64>,
 }
 
 impl Series {
-    /// The names that the columns of a rig have, as far as these are of joints: `q_elbow` for `elbow/position`.
+    /// The column names of a rig, for numbers of joints: `q_elbow` for `elbow/position`.
     fn short_names(&self) -> Vec<String> {
         let short = |name: &String| {
             let of_joint = CHANNELS
@@ -117,18 +117,18 @@ impl Recording {
             series: Vec::new(),
             series_by_names: HashMap::new(),
             notes: Vec::new(),
-            unpacked: Room::of(0),
-            kept: Room::of(0),
+            unpacked: Budget::of(0),
+            kept: Budget::of(0),
         }
     }
 
-    /// A file of it has so many bytes.
+    /// Adds a file of `packed` bytes.
     fn extend(&mut self, packed: u64) {
         self.unpacked.extend(packed);
         self.kept.extend(packed);
     }
 
-    /// Whether all was kept that is read of it.
+    /// Check that everything that is read of it was kept.
     fn check(&self) -> io::Result<()> {
         self.unpacked.check()?;
         self.kept.check()
@@ -164,13 +164,13 @@ impl Recording {
         match decoded {
             Ok(message) => self.sort_in(topic, logged_ns, message),
             Err(why) => {
-                let told = || format!("message {} of {} {why}", entry.messages, entry.name);
-                entry.fault.get_or_insert_with(told);
+                let message = || format!("message {} of {} {why}", entry.messages, entry.name);
+                entry.fault.get_or_insert_with(message);
             }
         }
     }
 
-    /// Keeps a message, where there is room for it.
+    /// Keeps a message if there is room for it.
     fn sort_in(&mut self, topic: usize, logged_ns: i64, message: Message) {
         let names = (topic, message.names);
         let is_known = self.series_by_names.contains_key(&names);
@@ -210,12 +210,12 @@ impl Recording {
     }
 }
 
-/// What a sample takes in its series, and then in the columns of a table \[bytes\].
+/// Memory that a sample takes in its series, and then in the columns of a table \[bytes\].
 fn bytes_of_sample(values: &[f64]) -> u64 {
     2 * (size_of::<Sample>() + size_of_val(values)) as u64
 }
 
-/// What the names of a series take, there and where it is looked for \[bytes\].
+/// Memory that the names of a series take, there and in the index \[bytes\].
 fn bytes_of_names(names: &[String]) -> u64 {
     let bytes = |name: &String| size_of::<String>() + name.len();
     2 * names.iter().map(bytes).sum::<usize>() as u64

@@ -7,11 +7,12 @@ use residyn_core::data::LogError;
 
 impl Recording {
     /// The columns `time`, `q_JOINT`, `qd_JOINT` and `tau_JOINT` of the rig's topic, and `/TOPIC/JOINT/position`,
-    /// `/TOPIC/1` and the like of others, whose numbers are held from one message to the next. Of topics that no column is
-    /// asked of, only the names are there.
+    /// `/TOPIC/1` and the like of others, whose numbers are held from one message to the next. Topics that no column
+    /// asks for are there by name only.
     ///
     /// # Errors
-    /// As [`Recording::choose`], and messages of the topics asked for that cannot be decoded, and more of them than is kept.
+    /// As [`Recording::choose`], and messages of the topics asked for that cannot be decoded, and more of them than can
+    /// be kept.
     pub(super) fn table(&self, columns: &Columns) -> Result<Arrays, LogError> {
         self.check().map_err(|why| self.fault(why.to_string()))?;
         let chosen = self.choose(columns)?;
@@ -21,23 +22,23 @@ impl Recording {
         let clock = Clock::of(&used);
         let all = clock.rows(chosen);
         let begins = |series: &&Series| Some(clock.rows(series).first()?.ns);
-        // Before its first message, nothing is known of a topic.
+        // Before its first message, nothing is known about a topic.
         let known = used.iter().filter_map(begins).max();
         let rows = &all[all.partition_point(|row| Some(row.ns) < known)..];
 
         let mut table = Arrays::of(self.kept.packed());
         table.notes.extend(self.notes.iter().cloned());
-        table.notes.push(self.told_of_time(chosen, clock));
+        table.notes.push(self.time_message(chosen, clock));
         table
             .notes
-            .extend(self.told_of_left_out(chosen, all.len() - rows.len()));
+            .extend(self.left_out_message(chosen, all.len() - rows.len()));
         let since = |row: &Row<'_>| seconds(row.ns, all[0].ns);
         table.add("time", rows.iter().map(since).collect());
         add(&mut table, chosen.short_names(), rows);
         for other in asked {
             let held = held(&clock.rows(other), rows);
             add(&mut table, self.full_names(other), &held);
-            table.notes.push(self.told_of_held(other, rows, &held));
+            table.notes.push(self.held_message(other, rows, &held));
         }
         for name in unasked.into_iter().flat_map(|other| self.full_names(other)) {
             table.add(name, Vec::new());
@@ -45,7 +46,7 @@ impl Recording {
         Ok(table)
     }
 
-    /// The series beside the rig's: those of which a column is asked, and the rest.
+    /// The series other than the rig's: those that a column asks for, and the rest.
     fn others(&self, chosen: &Series, columns: &Columns) -> (Vec<&Series>, Vec<&Series>) {
         let series = self.series.iter();
         let others = series.filter(|other| !std::ptr::eq(*other, chosen));
@@ -55,7 +56,7 @@ impl Recording {
         })
     }
 
-    /// Every message of these topics can be decoded.
+    /// Check that every message of these topics can be decoded.
     fn check_messages(&self, used: &[&Series]) -> Result<(), LogError> {
         let mut faults = used
             .iter()
@@ -73,7 +74,7 @@ impl Recording {
         names.map(|name| format!("{topic}/{name}")).collect()
     }
 
-    fn told_of_time(&self, chosen: &Series, clock: Clock) -> String {
+    fn time_message(&self, chosen: &Series, clock: Clock) -> String {
         let name = &self.topics[chosen.topic].name;
         let times = match clock {
             Clock::Stamps => "by the stamps in their headers",
@@ -82,22 +83,23 @@ impl Recording {
         format!("read from {name}, {times}")
     }
 
-    /// Messages of the topic that are no rows of the log.
-    fn told_of_left_out(&self, chosen: &Series, early: usize) -> Vec<String> {
+    /// Messages of the topic that are not rows of the log.
+    fn left_out_message(&self, chosen: &Series, early: usize) -> Vec<String> {
         let Topic { name, messages, .. } = &self.topics[chosen.topic];
         let others = messages.saturating_sub(chosen.samples.len());
-        let told = [
+        let message = [
             (others, "hold other joints"),
             (early, "are earlier than the first of the other topics"),
         ];
-        let told = told.into_iter().filter(|(count, _)| *count > 0);
-        told.map(|(count, why)| {
-            format!("{count} of {messages} messages of {name} {why} and are left out")
-        })
-        .collect()
+        let message = message.into_iter().filter(|(count, _)| *count > 0);
+        message
+            .map(|(count, why)| {
+                format!("{count} of {messages} messages of {name} {why} and are left out")
+            })
+            .collect()
     }
 
-    fn told_of_held(&self, other: &Series, rows: &[Row<'_>], held: &[Row<'_>]) -> String {
+    fn held_message(&self, other: &Series, rows: &[Row<'_>], held: &[Row<'_>]) -> String {
         let name = &self.topics[other.topic].name;
         let for_s = rows
             .iter()

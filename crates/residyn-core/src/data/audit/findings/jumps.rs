@@ -36,7 +36,7 @@ impl Found {
     }
 }
 
-/// From halfway to the row before, in digits that a log has, until no start state of a window is estimated from the row.
+/// From halfway to the previous row, in digits that a log has, until the row no longer enters a window's start state.
 fn around(log: &Log, step_s: f64, row: usize) -> Interval {
     let digits = (1e3 / step_s).log10().ceil().clamp(0.0, 9.0);
     let rounded = |t: f64| (t * 10.0_f64.powf(digits)).round() / 10.0_f64.powf(digits);

@@ -14,7 +14,7 @@ use crate::data::dropped::dropped;
 use crate::data::log::{Interval, Log};
 use Severity::{Info, Serious, Warning};
 
-/// Motion for less than this \[s\] is fewer than eight stretches of half a second, which tell no effects apart.
+/// Motion for less than this \[s\] is fewer than eight intervals of half a second, too few to distinguish effects.
 const LITTLE_MOTION_S: f64 = 4.0;
 
 /// Below this \[s\] not even one window of 0.5 s fits.
@@ -30,13 +30,13 @@ const MANY_SPIKES: f64 = 0.01;
 /// A smaller share of bad rows does not affect a robust fit.
 const SOME_SPIKES: f64 = 0.001;
 
-/// Beyond this share at rest most rows show static friction at best.
+/// Beyond this share at rest, most rows show static friction at best.
 const MUCH_REST: f64 = 0.5;
 
-/// Beyond this share the logger reads its source more often than that changes.
+/// Beyond this share, the logger reads its source more often than the source changes.
 const MANY_REPEATS: f64 = 0.2;
 
-/// A smaller share of dropped rows costs hardly a window.
+/// A smaller share of dropped rows hardly costs a window.
 const FEW_DROPPED: f64 = 0.001;
 
 /// All findings about a log, in the order of the joints.
@@ -98,7 +98,7 @@ impl Found {
         self.0.push(Finding::new(severity, text));
     }
 
-    /// A finding about stretches of the log.
+    /// A finding about intervals of the log.
     fn add_during(&mut self, spans: &[Interval], severity: Severity, text: impl Into<String>) {
         self.0.push(Finding::new(severity, text).during(spans));
     }
@@ -131,7 +131,7 @@ impl Found {
             self.add(
                 Info,
                 format!(
-                    "noise, resolution and motion are told by {examined_rows} of the {rows} rows, in stretches that are spread evenly \
+                    "noise, resolution and motion are told by {examined_rows} of the {rows} rows, in intervals that are spread evenly \
                      over the log; ranges, jumps, gaps and missing rows by all"
                 ),
             );
@@ -182,7 +182,7 @@ impl Found {
         }
         let steps = dropped(log);
         self.add_during(
-            &log.stretches(steps.iter().map(|step| step.row)),
+            &log.intervals(steps.iter().map(|step| step.row)),
             if share > FEW_DROPPED { Warning } else { Info },
             format!(
                 "{} row(s) are missing ({} as many as there are): the torque meanwhile is not known. Fits continue it \
@@ -206,7 +206,7 @@ impl Found {
         self.add(
             severity,
             format!(
-                "only {} s of motion, {} stretches of half a second: too few to tell effects apart; add logs, or record \
+                "only {} s of motion, {} intervals of half a second: too few to tell effects apart; add logs, or record \
                  for longer",
                 short(motion_s),
                 (motion_s / 0.5).floor()
@@ -261,7 +261,7 @@ pub(super) mod tests {
     use super::super::tests::{audit, one_joint, swing};
     use super::*;
 
-    /// Whether the audit says something of this severity that holds all the given words.
+    /// Whether the audit has a finding of this severity that contains all the given words.
     pub(in super::super) fn says(log: &Log, severity: Severity, words: &[&str]) -> bool {
         let audit = audit(log);
         let fits = |finding: &Finding| {
@@ -291,7 +291,7 @@ pub(super) mod tests {
         assert!(says(&still, Serious, &["joint 1 moves by 0 rad"]));
     }
 
-    /// The stretches of the finding that says this.
+    /// The intervals of the finding that says this.
     pub(super) fn spans(log: &Log, words: &str) -> Vec<[f64; 2]> {
         let findings = audit(log).findings;
         let mut said = findings
@@ -319,7 +319,7 @@ pub(super) mod tests {
         let mut stuck = swing();
         let exact = stuck.q[0].clone();
         (0..3000).for_each(|row| stuck.q[0][row] = exact[row - row % 2]);
-        // But for where the joint turns round.
+        // Except where the joint reverses.
         let repeated = spans(&stuck, "q1 repeats the row before");
         let length_s: f64 = repeated.iter().map(|[start, end]| end - start).sum();
         assert!(
@@ -353,11 +353,11 @@ pub(super) mod tests {
         off.qd[0][900] += 9.0;
         let disagrees = spans(&off, "qd1 has 1 sample(s)");
         assert_eq!(disagrees, [[time[900], time[901]]]);
-        let told = audit(&clipped).to_string();
-        let line = told.lines().find(|line| line.contains("t = 2 to 3.2 s"));
+        let message = audit(&clipped).to_string();
+        let line = message.lines().find(|line| line.contains("t = 2 to 3.2 s"));
         assert!(
             line.is_some_and(|line| line.starts_with("         ")),
-            "{told}"
+            "{message}"
         );
     }
 

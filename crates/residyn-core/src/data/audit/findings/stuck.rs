@@ -8,11 +8,11 @@ use super::Severity::Warning;
 use crate::data::dropped::DROPPED_STEPS;
 use crate::data::log::{Interval, Log};
 
-/// Shorter freezes cost hardly a window.
+/// Shorter freezes hardly cost a window.
 const LONG_S: f64 = 0.05;
 const LONG_ROWS: usize = 10;
 
-/// No joint at rest is this many times faster in the next row than it is in fast motion.
+/// No joint goes from rest to this many times its fast speed in one row.
 const TOO_FAST: f64 = 5.0;
 
 /// A change by fewer steps of the resolution than this is rounding.
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sensor_that_froze_is_told_with_its_time() {
+    fn a_sensor_that_froze_is_reported_with_its_time() {
         let mut log = swing();
         let held = log.q[0][1000];
         log.q[0][1000..1200].fill(held);

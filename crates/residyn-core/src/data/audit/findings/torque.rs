@@ -7,20 +7,20 @@ use super::{Found, is_passive, milliseconds, percent, spike_severity};
 use crate::data::jumps::rows_that_jump;
 use crate::data::log::Log;
 
-/// Less clipping than this leaves the torque usable as it is logged.
+/// Less clipping than this leaves the torque usable as logged.
 const MUCH_SATURATION: f64 = 0.02;
 
-/// A torque lag below one step cannot be told from how the rows are stamped.
+/// A torque lag below one step cannot be distinguished from the way the rows are stamped.
 const TORQUE_LAG_STEPS: f64 = 1.0;
 
 /// A longer lag pairs torques with the wrong accelerations by a good part of a fast motion.
 const LONG_LAG_STEPS: f64 = 3.0;
 
-/// Fast content beyond this share of the slow one is worth a word; beyond the other, the column is mostly noise.
+/// Fast content beyond this share of the slow content is reported; beyond the other, the column is mostly noise.
 const SOME_CHATTER: f64 = 0.5;
 const MUCH_CHATTER: f64 = 1.0;
 
-/// A torque of which the motion explains less than this share of the variance tells more of something else.
+/// If the motion explains less than this share of a torque's variance, the torque says more about something else.
 const WELL_EXPLAINED: f64 = 0.5;
 
 impl Found {
@@ -53,7 +53,7 @@ impl Found {
         if tau.saturated_fraction > MUCH_SATURATION {
             let at_limit = (0..log.rows()).filter(|row| tau.limits.contains(&values[*row]));
             self.add_during(
-                &log.stretches(at_limit),
+                &log.intervals(at_limit),
                 Warning,
                 format!(
                     "{name} sits at an end of its range ({} to {} N m) in {} of the rows: make sure \
@@ -66,7 +66,7 @@ impl Found {
         }
         if tau.spikes > 0 {
             self.add_during(
-                &log.stretches(rows_that_jump(values)),
+                &log.intervals(rows_that_jump(values)),
                 // Never serious: a command may chatter for good reason.
                 spike_severity(tau.spikes, log.rows()).max(Warning),
                 format!(
@@ -123,7 +123,7 @@ impl Found {
             "do not trust parameters from a regression of the torque; fit trajectories, as closeloop does"
         } else {
             "something else moves the joint (a hand, a contact, stiction), or the column is not the torque that acts; \
-             leave such stretches out, or check the column"
+             leave such intervals out, or check the column"
         };
         self.add(
             Warning,
@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn torque_that_the_motion_does_not_need_is_told_with_its_size() {
+    fn torque_that_the_motion_does_not_need_is_reported_with_its_size() {
         let mut log = swing();
         let signs = [30.0, -30.0].into_iter().cycle();
         let chatter = log.tau[0].iter_mut().zip(signs);
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_that_something_else_moves_is_told() {
+    fn a_joint_that_something_else_moves_is_reported() {
         let mut log = swing();
         let strange = |t: f64| 20.0 * (11.0 * t).sin();
         let times = log.time.clone();
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn a_torque_that_comes_early_is_told_with_its_remedy() {
+    fn a_torque_that_comes_early_is_reported_with_its_remedy() {
         let mut log = swing();
         log.tau[0].rotate_left(5);
         // A second motion, as gravity would explain a single one.

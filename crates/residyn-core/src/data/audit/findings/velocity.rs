@@ -13,7 +13,7 @@ const SCALE_OFF: f64 = 0.05;
 /// A backward difference lags by 0.5 steps; shorter lags are within the error of the estimate.
 const LAG_STEPS: f64 = 0.4;
 
-/// A longer lag is a filter's or a bus's, and pairs velocities with the wrong angles.
+/// A longer lag comes from a filter or a bus, and pairs velocities with the wrong angles.
 const LONG_LAG_STEPS: f64 = 1.5;
 
 impl Found {

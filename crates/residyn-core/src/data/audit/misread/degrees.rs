@@ -9,7 +9,7 @@ use crate::data::audit::response::response;
 use crate::data::audit::table::short;
 use crate::data::column::Quantity;
 
-/// In degrees a regression has to leave at most this share of what it leaves of the accelerations in radians,
+/// In degrees, a regression has to leave at most this share of the accelerations' variance that it leaves in radians,
 const MUCH_BETTER: f64 = 1.0 / 3.0;
 
 /// and to explain this much more of their variance: the last percent is a matter of friction, not of gravity.
@@ -19,7 +19,7 @@ const MUCH_MORE: f64 = 0.1;
 const DEGREE: f64 = TAU / 360.0;
 
 pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
-    // A motion of fewer degrees than a turn has radians is too small to tell them apart.
+    // A motion of fewer degrees than a turn has radians is too small to distinguish the two.
     let far = reading
         .joints
         .iter()
@@ -53,7 +53,7 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
         };
         left(audit).is_some_and(is_much_better)
     };
-    // One program writes all joints: where one is in degrees, another is that in degrees looks no worse.
+    // One program writes all joints: if one is in degrees, so is every other joint that looks no worse in degrees.
     let any = far.iter().any(is_beyond_doubt);
     let misread = |audit: &&JointAudit| {
         let (radians, degrees) = left(audit)?;

@@ -1,7 +1,7 @@
 //! Columns that hold something else than the model file says, and the lines under `[columns]` that mend it.
 //!
-//! A file a kind. They are looked for one after the other, each in the log as the ones before would mend it:
-//! no angle can be judged before its turns are counted, no speed before its time is in seconds.
+//! One file per kind. They are looked for one after the other, each in the log with the earlier fixes applied: an angle
+//! cannot be judged before its turns are counted, nor a speed before its time is in seconds.
 
 mod degrees;
 mod sign;
@@ -24,7 +24,7 @@ use crate::data::{Joint, Log};
 pub(super) struct Reading<'l> {
     pub log: Cow<'l, Log>,
     pub joints: Vec<JointAudit>,
-    /// The motions that accelerations are compared with torques in.
+    /// The motions in which accelerations are compared with torques.
     motions: Vec<Motion>,
 }
 
@@ -79,7 +79,8 @@ pub(super) fn as_meant<'l>(log: &'l Log, columns: &Columns) -> (Reading<'l>, Vec
     (reading, findings)
 }
 
-/// That what drives all joints has the opposite sign: reversed, it leaves the declared model this share of its error.
+/// The finding that all torques or commands have the opposite sign: reversed, they leave the declared model this share
+/// of its error.
 pub fn reversed_driving(
     share: f64,
     columns: &Columns,
@@ -115,7 +116,7 @@ impl<'l> Reading<'l> {
     }
 }
 
-/// Lines of all changes together, so that each is right beside the others.
+/// Findings whose lines hold all changes together, so that each line is right together with the others.
 fn with_remedies(found: &[Misread], columns: &Columns, joints: usize) -> Vec<Finding> {
     let mut mended = columns.whole(joints);
     for change in found.iter().flat_map(|one| &one.changes) {
@@ -155,7 +156,7 @@ impl Misread {
 }
 
 impl Change {
-    /// In the log.
+    /// Applies the change to the log.
     fn apply(&self, log: &mut Log) {
         let values = match (self.quantity, self.joint) {
             (Quantity::Angle, Some(joint)) => &mut log.q[joint],
@@ -178,7 +179,7 @@ impl Change {
         values.iter_mut().for_each(|value| *value *= factor);
     }
 
-    /// In the model file.
+    /// Applies the change to the columns of the model file.
     fn mend(&self, columns: &mut Columns) {
         if matches!(self.to, To::Derived) {
             columns.qd = None;

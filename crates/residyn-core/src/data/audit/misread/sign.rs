@@ -7,7 +7,7 @@ use crate::data::audit::table::short;
 use crate::data::column::Quantity;
 
 /// A torque has the opposite sign if the acceleration follows its negative more closely than this: unknown friction,
-/// contacts and delays make single joints of measured rigs answer weakly, but none to the other side.
+/// contacts and delays make single joints of measured rigs respond weakly, but never in the opposite direction.
 const AGAINST: f64 = -0.5;
 
 pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {

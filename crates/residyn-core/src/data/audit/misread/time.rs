@@ -4,12 +4,11 @@ use super::{Change, Misread, Reading, To};
 use crate::data::audit::table::short;
 use crate::data::column::Quantity;
 
-/// No rig that is worth a model is logged more slowly than this \[s\], and none faster than the other: rigs are logged at
-/// 5 Hz to 50 kHz.
+/// Longest and shortest plausible step \[s\]: rigs that are worth a model are logged at 5 Hz to 50 kHz.
 const LONGEST_STEP_S: f64 = 0.2;
 const SHORTEST_STEP_S: f64 = 2e-5;
 
-/// Logged speeds over the derivative of the angles are 1, but for the unit of time, if they are within this share of it.
+/// Logged speeds over the derivative of the angles count as 1, apart from the unit of time, within this share.
 const SAME: f64 = 0.2;
 
 pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
@@ -21,18 +20,18 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
     let fitting =
         units.filter(|(_, size)| (SHORTEST_STEP_S..=LONGEST_STEP_S).contains(&(step_s * size)));
     let mut fitting: Vec<(&'static str, f64)> = fitting.copied().collect();
-    // Speeds in rad/s say which.
-    let told = fitting
+    // Speeds in rad/s show which.
+    let message = fitting
         .iter()
         .copied()
         .find(|(_, size)| speeds_agree(reading, *size));
-    if let Some(unit) = told {
+    if let Some(unit) = message {
         fitting = vec![unit];
     }
     let Some(&(unit, _)) = fitting.first() else {
         return vec![];
     };
-    let speeds = match told {
+    let speeds = match message {
         Some((_, size)) => format!(
             ", and logged velocities are {} times the derivative of the angles",
             short(1.0 / size)
@@ -55,7 +54,7 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
     }]
 }
 
-/// Whether all velocities would be derivatives of their angles if a unit of time were so many seconds; false where
+/// Whether all velocities would be derivatives of their angles if the unit of time were this many seconds; false if
 /// none can be compared.
 fn speeds_agree(reading: &Reading<'_>, size: f64) -> bool {
     let checks: Vec<f64> = reading

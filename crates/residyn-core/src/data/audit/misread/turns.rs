@@ -8,8 +8,8 @@ use crate::data::column::Quantity;
 use crate::data::signal::differences;
 use crate::data::{Joint, Log};
 
-/// A joint turns by less than this share of a turn from one row to the next, or by at most twice as much as it does from
-/// the row before or to the row after, within the turn.
+/// From one row to the next, a joint turns by at most this share of a turn, or by at most twice its larger neighbouring
+/// step within the turn.
 const CONTINUES: f64 = 0.1;
 
 /// Rounding of the ends of a turn, as a share of it.
@@ -45,7 +45,7 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
     Joint::all(log.joints()).filter_map(of_joint).collect()
 }
 
-/// The rows after which an angle passes the end of a turn of this length; `None` where it never does, or does not stay
+/// The rows after which an angle passes the end of a turn of this length; `None` if it never does, or does not stay
 /// within one turn.
 fn passings(angles: &[f64], turn: f64) -> Option<Vec<usize>> {
     let highest = angles.iter().copied().fold(f64::NEG_INFINITY, f64::max);

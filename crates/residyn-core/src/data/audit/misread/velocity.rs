@@ -11,7 +11,8 @@ use crate::data::column::Quantity;
 /// A velocity that correlates less than this with the derivative of its angle is something else.
 const SAME_QUANTITY: f64 = 0.5;
 
-/// A ratio within this share of that of two units is theirs: filters and gear tolerances change a speed by less.
+/// A ratio within this share of the ratio of two units is taken for that ratio: filters and gear tolerances change a
+/// speed by less.
 const SAME: f64 = 0.05;
 
 /// A ratio this far from 1 is another unit or a gear ratio.
@@ -35,7 +36,7 @@ fn of_joint(audit: &JointAudit) -> Option<Misread> {
     Some(Misread::of_joint(audit.joint, text, quantity, to))
 }
 
-/// What is wrong, and the change that mends it. A velocity of opposite sign is for another place.
+/// What is wrong, and the change that fixes it. Velocities of opposite sign are handled elsewhere.
 fn wrong(audit: &JointAudit) -> Option<(String, Quantity, To)> {
     let (q, qd) = (&audit.q.name, &audit.qd.name);
     let derived = |text: String| {

@@ -10,7 +10,7 @@ use crate::model::chain::{Drivetrain, Inertia, Joint, Pose};
 /// exp(i q).
 pub(super) type Planar = Complex<f64>;
 
-/// Distance of a body's mass from its axis where the motion does not determine the mass, m.
+/// Radius of gyration of a body whose mass the motion does not determine, m.
 const GYRATION: f64 = 0.1;
 
 /// Joints in the world frame, and gravity (m/s^2) as a vector of the plane.
@@ -22,7 +22,8 @@ pub(super) type Links = (Vec<Joint>, Planar);
 /// Coefficients that no bodies can have.
 pub(super) type Build = fn(&[f64], f64) -> Result<Links, String>;
 
-/// A link that turns. `found` are the coefficients of [`Shape`](super::shape::Shape), `gravity` in m/s^2; so below.
+/// A link that turns. `found` are the coefficients of [`Shape`](super::shape::Shape), `gravity` in m/s^2; likewise
+/// below.
 pub(super) fn turning(found: &[f64], gravity: f64) -> Result<Links, String> {
     let [inertia, cos, sin, ..] = found[..] else {
         unreachable!("the shape has these")
@@ -43,7 +44,7 @@ pub(super) fn sliding(found: &[f64], gravity: f64) -> Result<Links, String> {
     Ok((vec![slide(mass)?], inclined(mass, force, gravity)))
 }
 
-/// Gravity that requires a static force of a slide along x.
+/// The gravity vector under which a slide along x needs this static force.
 fn inclined(mass: f64, force: f64, gravity: f64) -> Planar {
     let along = -force / mass;
     let across = (gravity.powi(2) - along.powi(2)).max(0.0).sqrt();
@@ -128,7 +129,7 @@ fn weight(cos: f64, sin: f64, gravity: f64) -> Planar {
     clean(Planar::new(-sin / gravity, -cos / gravity))
 }
 
-/// Without a component that is rounding of the other.
+/// Drops a component that is rounding relative to the other.
 fn clean(found: Planar) -> Planar {
     let part = |part: f64| {
         if part.abs() > ROUNDING * found.norm() {
@@ -140,7 +141,7 @@ fn clean(found: Planar) -> Planar {
     Planar::new(part(found.re), part(found.im))
 }
 
-/// `found`, or the expected value where they differ by rounding alone.
+/// `found`, or the expected value if they differ by rounding alone.
 fn near(expected: f64, found: Planar) -> Planar {
     let expected = Planar::new(expected, 0.0);
     if (found - expected).norm() < SAME * expected.norm() {

@@ -59,11 +59,11 @@ impl Recovered {
 /// The rotation that turns a direction against z.
 fn downwards(direction: Vector3<f64>) -> Matrix3<f64> {
     let turned = Rotation3::rotation_between(&direction, &-Vector3::z());
-    // None about which to turn where the direction is z itself.
+    // There is no unique axis of rotation if the direction is z itself.
     turned.map_or_else(|| turn(Vector3::x(), PI), Rotation3::into_inner)
 }
 
-/// How a link follows the first one of its joint.
+/// How a link follows the first link of its joint.
 fn follows(places: &[Place], link: usize) -> Option<Follows> {
     let Place {
         joint,
@@ -79,7 +79,7 @@ fn follows(places: &[Place], link: usize) -> Option<Follows> {
     })
 }
 
-/// Gravity where the equations do not contain it, m/s^2.
+/// Gravity if the equations do not contain it, m/s^2.
 const GRAVITY: f64 = 9.81;
 
 /// The mechanism with the equations of `declared`, effects excluded; `prismatic` says which joints slide.
@@ -88,7 +88,7 @@ const GRAVITY: f64 = 9.81;
 /// z.
 ///
 /// # Errors
-/// Equations of another kind of mechanism, or of one that no bodies can have.
+/// Equations of another kind of mechanism, or with inertia that no bodies can have.
 pub fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recovered, String> {
     let (shape, build): (Shape, Build) = match prismatic {
         [false] => (Shape::turning(), links::turning),
@@ -121,8 +121,8 @@ fn gravity(declared: &Dynamics) -> f64 {
     own.map_or(GRAVITY, |p| p.value)
 }
 
-/// Joints given in the world frame as joints of a chain, turned so that gravity acts against z. What differs by rounding from
-/// the model's own is that.
+/// Joints given in the world frame as joints of a chain, turned so that gravity acts against z. Gravity that differs
+/// from the model's by rounding is set to the model's.
 fn upright(mut joints: Vec<Joint>, downward: Planar, own: f64) -> Recovered {
     let level = Pose {
         rotation: turn(Vector3::y(), (-downward.conj()).arg()),

@@ -12,7 +12,7 @@ pub(super) const SAME: f64 = 1e-9;
 pub(super) const ROUNDING: f64 = 1e-10;
 pub(super) const KNOWN: &str = "it is none of the mechanisms that are known: one joint, two that turn in one plane, one that turns on one that slides";
 
-/// The terms whose weighted sum is the equations of one kind of mechanism.
+/// The terms whose weighted sum gives the equations of one kind of mechanism.
 pub(super) struct Shape {
     joints: usize,
     parts: Vec<Part>,
@@ -201,7 +201,7 @@ fn states(n: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
     states
 }
 
-/// Mass matrix and bias forces at a state; none where the mass matrix is singular.
+/// Mass matrix and bias forces at a state; none if the mass matrix is singular.
 fn inverse_dynamics(
     declared: &Dynamics,
     q: &[f64],

@@ -4,32 +4,33 @@ use rayon::prelude::*;
 use super::folds::{Folds, steps_without};
 use super::losses::of_torques;
 use super::trial::{Trial, differences};
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::settings::SelectSettings;
-use crate::closeloop::space::Space;
 use crate::data::statistics::{mean, standard_error};
 use crate::identify::{Values, Window};
 use crate::sim::FIT_S;
 use crate::sim::metric::{errors_in, windows};
 
-/// The error of a set of effects, as a report gives it, on stretches left out of the fit: squares in rad^2 (or m^2) of the
-/// open-loop motion, or of the torques over their noise, summed over the rows and joints of each stretch (of torques, over the rows of each stretch and joint). Fits compare models
-/// by a robust loss, over windows with free start states where they are of the motion; this is what the user sees.
-pub struct Ahead {
+/// The error of a set of effects, as reported, on blocks left out of the fit: squares of the open-loop motion in rad^2
+/// (or m^2), summed over the rows and joints of each block, or of the torques over their noise, summed over the rows of
+/// each block and joint. Fits compare models by a robust loss, for motion over windows with free start states; this
+/// error is what the user sees.
+pub struct OpenLoopCheck {
     squares: Vec<f64>,
 }
 
-impl Ahead {
+impl OpenLoopCheck {
     pub fn of(problem: &Problem<'_>, trial: &Trial) -> Self {
         let folds = Folds::of(problem);
-        let squares = match problem.space {
-            Space::Motion => of_motion(problem, &folds, trial),
-            Space::Torque => of_torques(problem, &folds, &trial.fitted, |r| r * r),
+        let squares = match problem.error_model {
+            ErrorModel::OutputError => of_motion(problem, &folds, trial),
+            ErrorModel::InverseDynamics => of_torques(problem, &folds, &trial.fitted, |r| r * r),
         };
         Self { squares }
     }
 
-    /// Whether this error is larger than another by more than chance and rounding.
+    /// Whether this error exceeds another by more than chance and rounding.
     pub fn is_worse_than(&self, other: &Self, settings: &SelectSettings) -> bool {
         let rises = differences(&self.squares, &other.squares);
         let rise = rises.iter().sum::<f64>() / other.squares.iter().sum::<f64>();
@@ -38,50 +39,50 @@ impl Ahead {
     }
 }
 
-/// Squares of the open-loop error in each stretch, with the values that a fit without the stretch's group gives.
+/// Squares of the open-loop error in each block, with the values that a fit without the block's group gives.
 fn of_motion(problem: &Problem<'_>, folds: &Folds, trial: &Trial) -> Vec<f64> {
     let fit = &trial.fitted.fit;
     let dynamics = problem.compiled(&trial.fitted.model);
     let values = Values::of(&dynamics, problem.logs);
     let steps = steps_without(folds, fit);
     let logs: Vec<Vec<(Window, usize)>> = (0..problem.logs.len())
-        .map(|log| stretches_of(problem, folds, log))
+        .map(|log| blocks_of(problem, folds, log))
         .collect();
     let of_group = |(group, step): (usize, &DVector<f64>)| {
         let there = values.moved(&dynamics, &fit.columns, step);
         let model = there.put_into(&dynamics, problem.logs);
         let of_log = |(log, all): (usize, &Vec<(Window, usize)>)| {
             let own = all.iter().filter(|(_, s)| folds.groups[*s] == group);
-            let (own, stretches): (Vec<Window>, Vec<usize>) = own.copied().unzip();
+            let (own, blocks): (Vec<Window>, Vec<usize>) = own.copied().unzip();
             if own.is_empty() {
                 return Vec::new();
             }
             let errors = errors_in(&model, &problem.logs[log..=log], &own, FIT_S);
             let squares = errors.iter().map(|error| error.position.iter().sum());
-            stretches.into_iter().zip(squares).collect()
+            blocks.into_iter().zip(squares).collect()
         };
         let all: Vec<(usize, f64)> = logs.iter().enumerate().flat_map(of_log).collect();
         all
     };
     let groups: Vec<_> = steps.par_iter().enumerate().map(of_group).collect();
     let mut squares = vec![0.0; folds.groups.len()];
-    for (stretch, square) in groups.into_iter().flatten() {
-        squares[stretch] += square;
+    for (block, square) in groups.into_iter().flatten() {
+        squares[block] += square;
     }
     squares
 }
 
-/// The windows of a log over which its open-loop error is taken, as if it were the only log, and the stretch in which
-/// each starts.
-fn stretches_of(problem: &Problem<'_>, folds: &Folds, log: usize) -> Vec<(Window, usize)> {
+/// The windows over which the open-loop error of a log is taken, as if it were the only log, and the block in which
+/// each window starts.
+fn blocks_of(problem: &Problem<'_>, folds: &Folds, log: usize) -> Vec<(Window, usize)> {
     let fitted = &problem.shooting.windows;
     let begin = fitted.partition_point(|window| window.log < log);
     let end = fitted.partition_point(|window| window.log <= log);
     let all = windows(0, &problem.logs[log], problem.settings.score.middle_s());
-    let stretch = |window: Window| {
+    let block = |window: Window| {
         let after = fitted[begin..end].partition_point(|of| of.first <= window.first);
         let before = after.checked_sub(1)?;
-        Some((window, folds.stretches[begin + before]))
+        Some((window, folds.blocks[begin + before]))
     };
-    all.into_iter().filter_map(stretch).collect()
+    all.into_iter().filter_map(block).collect()
 }

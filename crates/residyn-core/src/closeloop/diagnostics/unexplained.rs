@@ -4,29 +4,29 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::omnibus::{Omnibus, omnibus};
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::select::{Folds, Losses, acting, gain, p_value};
-use crate::closeloop::settings::RemainderSettings;
-use crate::closeloop::space::Space;
+use crate::closeloop::settings::DiagnosticsSettings;
 use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
-/// The unexplained remainder: what the residuals hold beyond noise when no effect helps any more.
+/// The unexplained residual: what the residuals hold beyond noise when no effect helps any more.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unexplained {
     /// Share of the declared model's residual variance above the sensor's noise that remains.
     #[schemars(range(min = 0))]
     pub fraction: f64,
-    /// Probability of so much structure in noise alone: the smaller of the omnibus test's and that of the probes
-    /// which save something that matters, times two.
+    /// Probability of as much structure in noise alone: twice the smaller of the omnibus test's p-value and that of the
+    /// probes with a noteworthy gain.
     #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
-    /// The variable that most of it depends on: `q1`, `qd2`, `tau1`, `t`, products of them such as `q1*qd1`,
-    /// `unknown` where it depends on none of them, `none` where it is not significant.
+    /// The variable that most of the residual depends on: `q1`, `qd2`, `tau1`, `t`, products of these such as `q1*qd1`,
+    /// `unknown` if it depends on none of them, `none` if it is not significant.
     #[serde(rename = "where")]
     pub place: String,
-    /// The joint with the largest remainder.
+    /// The joint with the largest unexplained residual.
     pub joint: Joint,
     pub omnibus: Omnibus,
     /// Flexible shapes, which name no effect.
@@ -36,19 +36,19 @@ pub struct Unexplained {
 /// The result of one flexible probe.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Probed {
-    /// The variables that it depends on.
+    /// The variables that the probe depends on.
     #[serde(rename = "where")]
     pub place: String,
     pub joint: Joint,
-    /// Probability, by the cluster-robust Wald test, of such a shape where there is none.
+    /// Probability, by the cluster-robust Wald test, of such a shape by chance.
     #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
-    /// Fall of the loss on left-out stretches, as a share.
+    /// Fall of the loss on left-out blocks, as a share.
     #[schemars(range(max = 1))]
     pub gain: f64,
 }
 
-/// The remainder depends on none of the variables tested.
+/// The unexplained residual depends on none of the variables tested.
 pub const UNKNOWN: &str = "unknown";
 const NONE: &str = "none";
 
@@ -57,22 +57,22 @@ impl Unexplained {
         self.place != NONE
     }
 
-    /// Share of the declared model's residual variance above noise that remains of what a joint is judged by.
+    /// Share of the declared model's residual variance above noise that remains, in the part that a joint is judged by.
     pub fn fraction_on(&self, problem: &Problem<'_>, joint: Joint) -> f64 {
-        match problem.space {
-            Space::Motion => self.fraction,
-            Space::Torque => self.omnibus.fractions[joint],
+        match problem.error_model {
+            ErrorModel::OutputError => self.fraction,
+            ErrorModel::InverseDynamics => self.omnibus.fractions[joint],
         }
     }
 
-    /// Whether a significant remainder is one of what a joint is judged by.
+    /// Whether a significant unexplained residual lies in the part that a joint is judged by.
     pub fn matters_on(&self, problem: &Problem<'_>, joint: Joint) -> bool {
-        let least = problem.settings.remainder.noteworthy_share;
-        problem.space == Space::Motion || self.omnibus.shares[joint] > least
+        let least = problem.settings.diagnostics.noteworthy_share;
+        problem.error_model == ErrorModel::OutputError || self.omnibus.shares[joint] > least
     }
 }
 
-/// Test what the model with effects leaves, beside what the declared one does, with the probes of the library.
+/// Test the residuals of the model with effects, relative to those of the declared model, with the library's probes.
 pub fn diagnose(
     problem: &Problem<'_>,
     before: &Fitted,
@@ -83,7 +83,7 @@ pub fn diagnose(
 }
 
 /// Test whether the residuals are more than noise, whatever their shape, and probe them with flexible shapes over each
-/// variable. Probes name no effect; they lower the loss on left-out stretches as an unknown effect would.
+/// variable. Probes name no effect; they lower the loss on left-out blocks as an unknown effect would.
 pub fn unexplained(
     problem: &Problem<'_>,
     probes: &[Effect],
@@ -101,7 +101,7 @@ pub fn unexplained(
     let asked = probed.len().max(1) as f64;
     let seen = probed
         .iter()
-        .filter(|p| p.gain > problem.settings.remainder.noteworthy_share);
+        .filter(|p| p.gain > problem.settings.diagnostics.noteworthy_share);
     let least = seen.map(|p| p.p_value).fold(1.0, f64::min);
     let (place, joint) = place(problem, &omnibus, &probed);
     Unexplained {
@@ -134,20 +134,21 @@ fn ask(
 
 /// The variable and the joint of the probe that lowers the loss most; one test among all probes and the omnibus test.
 fn place(problem: &Problem<'_>, omnibus: &Omnibus, probed: &[Probed]) -> (String, Joint) {
-    let RemainderSettings {
+    let DiagnosticsSettings {
         significance,
         noteworthy_share,
         located_share,
         unlocated_share,
         ..
-    } = problem.settings.remainder;
+    } = problem.settings.diagnostics;
     #[allow(clippy::cast_precision_loss)] // few probes
     let level = 0.5 * significance / probed.len().max(1) as f64;
     let (joint, share) = omnibus.most();
     let matters = noteworthy_share.max(located_share * share);
-    // What friction leaves of low-passed torques near its reversals is located by the velocity.
+    // The residual of low-passed torques near friction reversals is located by the velocity.
     let is_smoothing = |joint: Joint| {
-        problem.space == Space::Torque && omnibus.fractions[joint] <= unlocated_share
+        problem.error_model == ErrorModel::InverseDynamics
+            && omnibus.fractions[joint] <= unlocated_share
     };
     let stands_out = |p: &&Probed| p.p_value < level && p.gain > matters && !is_smoothing(p.joint);
     let most = probed.iter().filter(stands_out);

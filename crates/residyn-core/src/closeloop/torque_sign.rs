@@ -5,9 +5,10 @@ use super::problem::Problem;
 use crate::data::{Audit, Log, Remedy, reversed_driving};
 
 impl Problem<'_> {
-    /// Add to the audits of the problem's logs that their torques, or commands, look reversed on all joints at once. The audit
-    /// of a log alone tells so of single joints, where the acceleration follows them closely; here the model tells.
-    pub(super) fn tell_reversed(&self, usual: Option<&Fitted>, audits: &mut [Audit]) {
+    /// Report in the audits of the problem's logs that their torques, or commands, look reversed on all joints at once.
+    /// The audit of a log alone finds this on single joints whose acceleration follows them closely; here the model
+    /// shows it.
+    pub(super) fn report_reversed(&self, usual: Option<&Fitted>, audits: &mut [Audit]) {
         let key = self.declared.driven_by().key();
         if !self.moves() || audits.iter().any(|audit| mends(audit, key)) {
             return;
@@ -33,7 +34,7 @@ impl Problem<'_> {
     }
 }
 
-/// Whether an audit has something else to mend in what drives the joints.
+/// Whether an audit already proposes another remedy for the columns that drive the joints.
 fn mends(audit: &Audit, key: &str) -> bool {
     let mut lines = audit.serious().filter_map(|finding| match &finding.remedy {
         Some(Remedy::Columns(lines)) => Some(lines),

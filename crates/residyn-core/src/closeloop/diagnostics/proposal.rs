@@ -8,28 +8,28 @@ use serde::{Deserialize, Serialize};
 use super::unexplained::Unexplained;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::closeloop::select::{Losses, best_start, gain, promise};
+use crate::closeloop::select::{Losses, best_start, gain, screened_cost};
 use crate::data::{Joint, Quantity};
 use crate::model::{Effect, FittedEffect};
 
-/// A formula for the remainder: a proposal, not a finding. Supported only by its fit.
+/// A formula for the unexplained residual: a proposal, not a finding, supported only by its fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Proposal {
     pub joint: Joint,
     /// Force in N m (or N), such as `-0.0012 * qd1^3`.
     pub formula: String,
-    /// Share of the loss above noise that it takes away, on stretches left out of its fit.
+    /// Share of the loss above noise that the formula removes, on blocks left out of its fit.
     #[schemars(range(max = 1))]
     pub explains: f64,
     /// The formula as an effect file, for a folder of a library.
     pub file: String,
 }
 
-/// A term of the joint's own variables, and the powers of q, qd, tau and t in its unit.
+/// A term in the joint's variables, and the powers of q, qd, tau and t in its unit.
 type Term = (&'static str, [i32; 4]);
 
 /// Terms of forces in machines. Linear, square and cubic terms have units that give their coefficients a meaning;
-/// functions of the angle and signs have none.
+/// functions of the angle and signs have no units.
 const TERMS: [Term; 31] = [
     ("1", [0, 0, 0, 0]),
     ("q", [1, 0, 0, 0]),
@@ -63,14 +63,14 @@ const TERMS: [Term; 31] = [
     ("t*qd", [0, 1, 0, 1]),
     ("t*tau", [0, 0, 1, 1]),
 ];
-/// A short sum of terms for the force that `model` lacks on the joint with the largest remainder: terms are added while
-/// they lower the loss on stretches left out of the fit. `None` where the remainder is not significant, or no term fits
-/// it.
+/// A short sum of terms for the force that the model lacks on the joint with the largest unexplained residual: terms
+/// are added while they lower the loss on blocks left out of the fit. `None` if the residual is not significant, or no
+/// term fits it.
 pub fn proposal(problem: &Problem<'_>, fitted: &Fitted, left: &Unexplained) -> Option<Proposal> {
     if !left.is_significant() {
         return None;
     }
-    let noteworthy = problem.settings.remainder.noteworthy_share;
+    let noteworthy = problem.settings.diagnostics.noteworthy_share;
     let without = Losses::of(problem, fitted).of_joint(left.joint);
     let mut found: Option<Sum> = None;
     for _ in 0..problem.settings.proposal.most_terms {
@@ -94,7 +94,7 @@ pub fn proposal(problem: &Problem<'_>, fitted: &Fitted, left: &Unexplained) -> O
     })
 }
 
-/// Terms that were fitted beside all parameters of a model.
+/// Terms that were fitted together with all parameters of a model.
 struct Sum {
     terms: Vec<Term>,
     effect: FittedEffect,
@@ -109,12 +109,12 @@ fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -
         .filter_map(|term| {
             let terms = [terms, &[*term]].concat();
             let effect = effect(&terms);
-            if !problem.space.shows(&effect) {
+            if !problem.error_model.shows(&effect) {
                 return None;
             }
             let effect = FittedEffect::absent(&effect, joint);
             let start = best_start(problem, model, &effect)?;
-            let cost = promise(problem, model, &start)?;
+            let cost = screened_cost(problem, model, &start)?;
             Some((terms, start, cost))
         })
         .collect();
@@ -166,7 +166,7 @@ fn effect(terms: &[Term]) -> Effect {
     Effect::from_text(Path::new("proposal.toml"), &text).expect("terms are formulas of an effect")
 }
 
-/// An effect file with one coefficient a term, of these magnitudes.
+/// An effect file with one coefficient a term, with these typical magnitudes.
 fn file(terms: &[Term], magnitudes: &[f64]) -> String {
     let sum: Vec<String> = terms
         .iter()
@@ -189,7 +189,7 @@ fn file(terms: &[Term], magnitudes: &[f64]) -> String {
     text
 }
 
-/// The unit of a force over so many rad, rad/s, N m and s.
+/// The unit of a force over these powers of rad, rad/s, N m and s.
 fn unit([q, qd, tau, t]: [i32; 4]) -> String {
     let powers = |unit: &str, power: i32| match power {
         0 => None,
@@ -198,7 +198,7 @@ fn unit([q, qd, tau, t]: [i32; 4]) -> String {
     };
     let listed =
         |parts: &[Option<String>]| -> Vec<String> { parts.iter().flatten().cloned().collect() };
-    // The torque that a coefficient gives, over the torques that it takes; seconds count on both sides.
+    // The torque that the term gives, over the torques in it; seconds count on both sides.
     let force = match tau {
         0 => Some("N m".to_owned()),
         _ => None,

@@ -3,14 +3,17 @@ use crate::model::{Effect, FittedEffect};
 
 use super::candidate::acting;
 
-/// The first of the sets that most machines have: the friction of every joint, unless the model file has it.
-pub fn usual_friction(problem: &Problem<'_>) -> Vec<FittedEffect> {
-    blocks(problem).into_iter().next().unwrap_or_default()
+/// The smallest baseline set: the friction of every joint, unless the model file has it.
+pub fn baseline_friction(problem: &Problem<'_>) -> Vec<FittedEffect> {
+    baseline_sets(problem)
+        .into_iter()
+        .next()
+        .unwrap_or_default()
 }
 
-/// What most machines have, each set on all joints together: where every joint has friction, none of it helps much alone. Each set
-/// holds the effects up to a baseline rank.
-pub fn blocks(problem: &Problem<'_>) -> Vec<Vec<FittedEffect>> {
+/// The baseline sets, which most machines have, each on all joints together: if every joint has friction, adding it to
+/// one joint helps little. Each set holds the effects up to a baseline rank.
+pub fn baseline_sets(problem: &Problem<'_>) -> Vec<Vec<FittedEffect>> {
     let declared = &problem.declared.effects;
     let mut ranks: Vec<usize> = (problem.effects().iter())
         .filter_map(|effect| effect.baseline)

@@ -9,13 +9,13 @@ use crate::identify::FitError;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResidualForce {
     pub samples: Vec<ForceSample>,
-    /// The same as smooth curves over each variable.
+    /// The samples as smooth curves over each variable.
     pub curves: Vec<Curve>,
 }
 
 impl ResidualForce {
     /// # Errors
-    /// Logs without a stretch, or a model that diverges over one of them.
+    /// If the logs have no block, or the model diverges over a block.
     pub(in crate::closeloop) fn of(
         problem: &Problem<'_>,
         fitted: &Fitted,
@@ -31,9 +31,8 @@ impl ResidualForce {
         })
     }
 
-    /// Root mean square over stretches and joints, outliers weighing no more than three times the median: in N m
-    /// (or N).
-    #[allow(clippy::cast_precision_loss)] // few stretches
+    /// Root mean square over blocks and joints, with outliers limited to three times the median, in N m (or N).
+    #[allow(clippy::cast_precision_loss)] // few blocks
     pub fn norm(&self) -> f64 {
         let forces = self.samples.iter().flat_map(|sample| &sample.force);
         let squares: Vec<f64> = forces.map(|force| force * force).collect();

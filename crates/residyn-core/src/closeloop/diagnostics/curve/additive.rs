@@ -5,11 +5,11 @@ use super::basis::{Basis, SPLINES};
 use crate::closeloop::settings::CurveSettings;
 use crate::data::statistics::{SIGMA_PER_MAD, upper_median};
 
-/// An intercept and a smooth share of each variable, fitted together by penalised least squares.
+/// An intercept and a smooth function of each variable, fitted together by penalised least squares.
 pub(super) struct Additive {
     coefficients: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// 97.5 % quantile of Student's t with one degree of freedom a stretch less one.
+    /// 97.5 % quantile of Student's t, with one degree of freedom fewer than blocks.
     quantile: f64,
 }
 
@@ -22,7 +22,7 @@ struct Sums {
 }
 
 impl Additive {
-    /// `None` where the forces do not determine the curves.
+    /// `None` if the forces do not determine the curves.
     pub fn fit(
         bases: &[&Basis],
         forces: &DVector<f64>,
@@ -46,7 +46,7 @@ impl Additive {
         let total = Sums::total(&parts);
         let coefficients = solve(&total, &penalties)?.solve(&total.right);
         let covariance = jackknife(&total, &parts, &penalties, &coefficients)?;
-        #[allow(clippy::cast_precision_loss)] // few stretches
+        #[allow(clippy::cast_precision_loss)] // few blocks
         let freedom = parts.len() as f64 - 1.0;
         let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
         Some(Self {
@@ -56,8 +56,8 @@ impl Additive {
         })
     }
 
-    /// The force at a value of the k-th variable, without the shares of the others, and the half width of its 95 %
-    /// confidence band.
+    /// The force at a value of the k-th variable, without the contributions of the others, and the half width of its
+    /// 95 % confidence band.
     pub fn at(&self, k: usize, basis: &Basis, x: f64) -> (f64, f64) {
         let mut row = DVector::zeros(self.coefficients.len());
         row[0] = 1.0;
@@ -123,7 +123,7 @@ impl Sums {
     }
 }
 
-/// The penalty of each variable that predicts left-out stretches best, by coordinate search.
+/// The penalty of each variable that predicts left-out blocks best, by coordinate search.
 fn smoothness(
     parts: &[Sums],
     variables: usize,
@@ -168,8 +168,8 @@ fn smoothness(
     Some(penalty(&powers, rows))
 }
 
-/// Squared second differences of neighbouring coefficients. A small multiple of their squares is added: it holds the
-/// directions that the data do not determine, and where the penalty is large it removes slopes as well.
+/// Squared second differences of neighbouring coefficients. A small multiple of their squares is added: it regularises
+/// the directions that the data do not determine, and if the penalty is large it removes slopes as well.
 fn penalty(powers: &[i32], rows: usize) -> DMatrix<f64> {
     #[allow(clippy::cast_precision_loss)] // few samples
     let rows = rows as f64;
@@ -201,7 +201,7 @@ fn weights(residuals: &DVector<f64>, huber: f64) -> DVector<f64> {
     residuals.map(|r| (limit / r.abs().max(f64::MIN_POSITIVE)).min(1.0))
 }
 
-/// Covariance of the coefficients by leaving out each stretch in turn: samples of one stretch need not be
+/// Covariance of the coefficients by leaving out each block in turn: samples of one block need not be
 /// independent.
 fn jackknife(
     total: &Sums,
@@ -216,7 +216,7 @@ fn jackknife(
             .solve(&(&part.right - &part.matrix * coefficients));
         covariance += &step * step.transpose();
     }
-    #[allow(clippy::cast_precision_loss)] // few stretches
+    #[allow(clippy::cast_precision_loss)] // few blocks
     let count = parts.len() as f64;
     Some(covariance * ((count - 1.0) / count))
 }

@@ -12,8 +12,8 @@ use clap::Args;
 
 /// How much is said.
 #[derive(Debug, Clone, Copy, Default, Args)]
-pub(super) struct Voice {
-    /// Print the headline of the answer alone, and errors
+pub(super) struct Verbosity {
+    /// Print only the headline of the answer, and errors
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
     /// Say on standard error what is done, and how long it took
@@ -22,7 +22,7 @@ pub(super) struct Voice {
 }
 
 /// Set once, before anything is said.
-static VOICE: OnceLock<Voice> = OnceLock::new();
+static VERBOSITY: OnceLock<Verbosity> = OnceLock::new();
 
 /// Words that a line begins with, and their colours.
 const LABELS: [(&str, Style); 5] = [
@@ -33,14 +33,14 @@ const LABELS: [(&str, Style); 5] = [
     ("note", AnsiColor::Cyan.on_default()),
 ];
 
-impl Voice {
-    /// All that follows is said in this voice.
+impl Verbosity {
+    /// Set how much is said on standard error from now on.
     pub fn begin(self) {
-        VOICE.get_or_init(|| self);
+        VERBOSITY.get_or_init(|| self);
     }
 
     fn now() -> Self {
-        VOICE.get().copied().unwrap_or_default()
+        VERBOSITY.get().copied().unwrap_or_default()
     }
 }
 
@@ -65,7 +65,7 @@ pub(super) fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Whether standard output is a terminal that shows UTF-8, as far as its locale says.
+/// Whether standard output is a terminal that shows UTF-8, according to its locale.
 pub(super) fn shows_curves() -> bool {
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"].map(|name| std::env::var(name).unwrap_or_default());
     let locale = locale.into_iter().find(|value| !value.is_empty());
@@ -78,19 +78,19 @@ pub(super) fn shows_curves() -> bool {
 
 /// Whether nothing but headlines and errors is asked for.
 pub(super) fn is_quiet() -> bool {
-    Voice::now().quiet
+    Verbosity::now().quiet
 }
 
-/// A line on standard error that a quiet run does without.
+/// A line on standard error that a quiet run omits.
 pub(super) fn say(line: impl Display) {
     if !is_quiet() {
         tell(line);
     }
 }
 
-/// A line on standard error that is always told.
+/// A line on standard error that is always printed.
 pub(super) fn tell(line: impl Display) {
-    // Where nobody listens any more, there is nobody to tell it.
+    // If nobody reads standard error any more, there is nobody to report to.
     let _ = anstream::stderr()
         .lock()
         .write_all(coloured(&format!("{line}\n")).as_bytes());
@@ -106,7 +106,7 @@ pub(super) fn stage<T>(what: &str, work: impl FnOnce() -> T) -> T {
 
 /// In a verbose run, how long something took.
 pub(super) fn took(what: &str, begun: Instant) {
-    if Voice::now().verbose {
+    if Verbosity::now().verbose {
         tell(format!("{:>8.2} s  {what}", begun.elapsed().as_secs_f64()));
     }
 }

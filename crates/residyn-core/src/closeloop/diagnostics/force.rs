@@ -1,19 +1,19 @@
 use std::f64::consts::{PI, TAU};
 
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::closeloop::space::Space;
 use crate::data::Log;
 use crate::identify::{FitError, Shooting, Values, Window, fit};
 
-/// The residual force of a model over one short stretch of a log: the constant generalised force that, added to
+/// The residual force of a model over one short block of a log: the constant generalised force that, added to
 /// the torque, makes the model follow the logged positions best.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForceSample {
     pub log: usize,
-    /// Middle of the stretch in s.
+    /// Middle of the block in s.
     pub time_s: f64,
-    /// Means over the stretch, one a joint.
+    /// Means over the block, one a joint.
     pub q: Vec<f64>,
     pub qd: Vec<f64>,
     pub tau: Vec<f64>,
@@ -21,19 +21,20 @@ pub struct ForceSample {
     pub force: Vec<f64>,
 }
 
-/// The residual generalised force along the logs: found on trajectories, where no measurement is differentiated, or by the
-/// torques that the smoothed motion needs beside those that act. Angles are within the turn where a joint makes more than one.
+/// The residual generalised force along the logs: found on trajectories, where no measurement is differentiated, or as
+/// the torques that the smoothed motion needs beyond those that act. Angles are taken within the turn for joints that
+/// make more than one.
 ///
 /// # Errors
-/// Logs without a stretch, or a model that diverges over one of them.
+/// If the logs have no block, or the model diverges over a block.
 pub(in crate::closeloop) fn residual_force(
     problem: &Problem<'_>,
     fitted: &Fitted,
 ) -> Result<Vec<ForceSample>, FitError> {
-    let shooting = problem.windows_of(problem.settings.remainder.stretch_s);
-    let forces = match problem.space {
-        Space::Motion => forces_of_motion(&shooting, fitted)?,
-        Space::Torque => forces_of_torques(problem, &shooting, fitted)?,
+    let shooting = problem.windows_of(problem.settings.diagnostics.block_s);
+    let forces = match problem.error_model {
+        ErrorModel::OutputError => forces_of_motion(&shooting, fitted)?,
+        ErrorModel::InverseDynamics => forces_of_torques(problem, &shooting, fitted)?,
     };
     let logs = problem.logs.iter();
     let torques: Vec<Vec<Vec<f64>>> = logs.map(|log| fitted.model.drive_torques(log)).collect();
@@ -45,22 +46,22 @@ pub(in crate::closeloop) fn residual_force(
             force,
         )
     };
-    let stretches = shooting.windows.iter().zip(&forces);
-    let mut samples: Vec<ForceSample> = stretches.map(sample).collect();
+    let blocks = shooting.windows.iter().zip(&forces);
+    let mut samples: Vec<ForceSample> = blocks.map(sample).collect();
     within_turn(&mut samples, &problem.declared.prismatic);
     Ok(samples)
 }
 
-/// For each window the constant force that makes the model follow the log best.
+/// For each window, the constant force that makes the model follow the log best.
 fn forces_of_motion(shooting: &Shooting<'_>, fitted: &Fitted) -> Result<Vec<Vec<f64>>, FitError> {
     let dynamics = fitted.model.dynamics();
-    let locals = shooting.initial_locals(dynamics.joints);
-    let (_, found) = fit(shooting, &dynamics, &[], locals, None)?;
+    let start_states = shooting.initial_start_states(dynamics.joints);
+    let (_, found) = fit(shooting, &dynamics, &[], start_states, None)?;
     let force = |local: &Vec<f64>| local[2 * dynamics.joints..].to_vec();
-    Ok(found.locals.iter().map(force).collect())
+    Ok(found.start_states.iter().map(force).collect())
 }
 
-/// For each window the mean of the torques by which its motion needs more than acts.
+/// For each window, the mean of the torques that its motion needs beyond those that act.
 fn forces_of_torques(
     problem: &Problem<'_>,
     shooting: &Shooting<'_>,
@@ -68,7 +69,7 @@ fn forces_of_torques(
 ) -> Result<Vec<Vec<f64>>, FitError> {
     let dynamics = problem.compiled(&fitted.model);
     let values = Values::of(&dynamics, problem.logs);
-    let residuals = shooting.residuals(&dynamics, &values, &shooting.initial_locals(0));
+    let residuals = shooting.residuals(&dynamics, &values, &shooting.initial_start_states(0));
     if residuals.is_empty() {
         return Err(FitError::NoWindow);
     }
@@ -84,7 +85,7 @@ fn forces_of_torques(
 }
 
 impl ForceSample {
-    /// The sample of one stretch of a log, under these torques, with the force that was found there.
+    /// The sample of one block of a log, with these torques and the force found there.
     fn over(window: &Window, log: &Log, tau: &[Vec<f64>], force: &[f64]) -> Self {
         let rows = window.first..=window.last;
         #[allow(clippy::cast_precision_loss)] // few rows
@@ -103,8 +104,8 @@ impl ForceSample {
     }
 }
 
-/// Where a turning joint makes more than a full turn, the angle within the turn, from -pi to pi: that is what a
-/// force can depend on.
+/// For a turning joint that makes more than a full turn, take the angle within the turn, from -pi to pi: a force can
+/// depend only on that angle.
 fn within_turn(samples: &mut [ForceSample], prismatic: &[bool]) {
     for (joint, _) in prismatic.iter().enumerate().filter(|(_, slides)| !**slides) {
         let reach = samples.iter().map(|s| s.q[joint].abs()).fold(0.0, f64::max);

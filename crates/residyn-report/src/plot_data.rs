@@ -7,111 +7,111 @@ use serde::{Deserialize, Serialize};
 use super::effect_curve::{EffectCurveEntry, effect_curves};
 use super::headline::label;
 use super::motion::MotionEntry;
-use residyn_core::closeloop::{ForceSample, Outcome, ResidualForce, Space};
+use residyn_core::closeloop::{ErrorModel, ForceSample, Outcome, ResidualForce};
 use residyn_core::data::{Joint, Log};
 use residyn_core::sim::metric::Trace;
 
 /// curves and points for pictures
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
-pub(super) struct ShownEntry {
+pub(super) struct PlotData {
     /// measured and predicted: the beginning of the first test log, and the predictions with the median and the largest error
-    pub stretches: Vec<StretchEntry>,
-    /// null where no stretch of the first test log is as long as the middle horizon
+    pub segments: Vec<SegmentEntry>,
+    /// null if no segment of the first test log is as long as the middle horizon
     pub motion: Option<MotionEntry>,
     /// residual generalised force, joint by joint
-    pub residuals: Vec<CloudEntry>,
+    pub residuals: Vec<ScatterEntry>,
 }
 
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
-pub(super) struct StretchEntry {
+pub(super) struct SegmentEntry {
     /// in a few words
     pub about: String,
     pub log: String,
     /// s
     pub time: Vec<f64>,
-    pub joints: Vec<TracksEntry>,
+    pub joints: Vec<SeriesEntry>,
 }
 
-/// null where a prediction begins anew, or diverged
+/// null where a prediction restarts, or diverged
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
-pub(super) struct TracksEntry {
+pub(super) struct SeriesEntry {
     /// with the joint and the unit
     pub quantity: String,
     pub measured: Vec<Option<f64>>,
     pub before: Vec<Option<f64>>,
     pub after: Vec<Option<f64>>,
-    /// empty where no network is used
+    /// empty if no network is used
     pub hybrid: Vec<Option<f64>>,
 }
 
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
-pub(super) struct CloudEntry {
+pub(super) struct ScatterEntry {
     pub joint: Joint,
-    /// of the joint's position, velocity and torque, the unit of each
+    /// units of the joint's position, velocity and torque
     pub units: [String; 3],
     pub q: Vec<f64>,
     pub qd: Vec<f64>,
     pub tau: Vec<f64>,
     pub time: Vec<f64>,
-    /// of the declared model, fitted; N m or N
+    /// residual force of the declared model, fitted; N m or N
     pub before: Vec<f64>,
-    /// of the model with the effects, N m or N; empty where one of the two was not computed
+    /// residual force of the model with the effects, N m or N; empty if one of the two was not computed
     pub after: Vec<f64>,
     /// what the effects add by their formulas
     pub effects: Vec<EffectCurveEntry>,
 }
 
-/// Length of a stretch of torques, s.
+/// Length of a segment of torques, s.
 const STRETCH_S: f64 = 2.0;
-/// Length of the part that is shown of the first test log, s.
+/// Length of the part of the first test log that is shown, s.
 const COURSE_S: f64 = 20.0;
-/// Points of a curve at most, and of a cloud.
+/// Most points of a curve, and of a scatter.
 const POINTS: usize = 800;
 const CLOUD: usize = 300;
 
-impl ShownEntry {
+impl PlotData {
     pub fn of(outcome: &Outcome) -> Self {
-        let courses: Vec<Course<'_>> = match outcome.space {
-            Space::Motion => motions(outcome),
-            Space::Torque => torques(outcome),
+        let series: Vec<Series<'_>> = match outcome.error_model {
+            ErrorModel::OutputError => motions(outcome),
+            ErrorModel::InverseDynamics => torques(outcome),
         };
         Self {
-            stretches: stretches(outcome, &courses),
+            segments: segments(outcome, &series),
             motion: MotionEntry::of(outcome),
-            residuals: clouds(outcome),
+            residuals: scatters(outcome),
         }
     }
 }
 
 /// Measured and predicted along a log.
-pub(super) struct Course<'a> {
+pub(super) struct Series<'a> {
     pub log: &'a Log,
     pub time: Vec<f64>,
-    /// The window of each row: predictions begin anew with it.
+    /// The window of each row: predictions restart with each window.
     window: Vec<usize>,
     /// `[joint][row]`
     pub measured: Vec<Vec<f64>>,
-    /// The fitted declared model, that with effects and, if one is used, that with a network: `[model][joint][row]`.
+    /// The fitted declared model, the model with effects and, if used, the model with a network: `[model][joint][row]`.
     pub models: Vec<Vec<Vec<f64>>>,
 }
 
 /// Open-loop predictions over the longest horizon, one after the other.
-fn motions(outcome: &Outcome) -> Vec<Course<'_>> {
+fn motions(outcome: &Outcome) -> Vec<Series<'_>> {
     let is_used = (outcome.learned.as_ref()).is_some_and(|learned| learned.check.used);
     let tests = outcome.given.test.iter().zip(&outcome.predictions.longest);
-    let courses = tests.map(|(log, predicted)| {
+    let series = tests.map(|(log, predicted)| {
         let network = predicted.hybrid.as_deref().filter(|_| is_used);
         let fitted = [predicted.before.as_slice(), &predicted.after];
         motion(log, fitted.into_iter().chain(network))
     });
-    courses.filter(|course| !course.time.is_empty()).collect()
+    series.filter(|one| !one.time.is_empty()).collect()
 }
 
 /// Open-loop predictions of a log, model by model.
 pub(super) fn motion<'a>(
     log: &'a Log,
     models: impl IntoIterator<Item = &'a [Trace]>,
-) -> Course<'a> {
+) -> Series<'a> {
     let of_models: Vec<&[Trace]> = models.into_iter().collect();
     let windows = || of_models[0].iter().enumerate();
     let time: Vec<f64> = windows()
@@ -119,7 +119,7 @@ pub(super) fn motion<'a>(
         .collect();
     let row = |t: &f64| log.time.partition_point(|logged| logged < t);
     let joints = || Joint::all(log.q.len());
-    Course {
+    Series {
         log,
         window: windows()
             .flat_map(|(k, trace)| vec![k; trace.time.len()])
@@ -142,14 +142,14 @@ pub(super) fn motion<'a>(
 }
 
 /// Logged torques and those that the motion needs.
-fn torques(outcome: &Outcome) -> Vec<Course<'_>> {
+fn torques(outcome: &Outcome) -> Vec<Series<'_>> {
     let tests = outcome.given.test.iter().zip(&outcome.predictions.torques);
-    let courses = tests.filter_map(|(log, needed)| {
+    let series = tests.filter_map(|(log, needed)| {
         let (before, after) = (needed.before.as_ref()?, needed.after.as_ref()?);
         let start_s = before.time.first()?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // time since the start
         let window = |t: &f64| ((t - start_s) / STRETCH_S) as usize;
-        Some(Course {
+        Some(Series {
             log,
             window: before.time.iter().map(window).collect(),
             measured: before.logged.clone(),
@@ -157,15 +157,15 @@ fn torques(outcome: &Outcome) -> Vec<Course<'_>> {
             time: before.time.clone(),
         })
     });
-    courses.collect()
+    series.collect()
 }
 
-/// Rows of a course.
+/// Rows of a series.
 type Rows = std::ops::Range<usize>;
 
-/// The windows of a course.
-fn windows(course: &Course<'_>) -> Vec<Rows> {
-    let ends = course.window.chunk_by(|a, b| a == b);
+/// The windows of a series.
+fn windows(one: &Series<'_>) -> Vec<Rows> {
+    let ends = one.window.chunk_by(|a, b| a == b);
     let window = |start: &mut usize, part: &[usize]| {
         let rows = *start..*start + part.len();
         *start = rows.end;
@@ -174,29 +174,29 @@ fn windows(course: &Course<'_>) -> Vec<Rows> {
     ends.scan(0, window).collect()
 }
 
-fn stretches(outcome: &Outcome, courses: &[Course<'_>]) -> Vec<StretchEntry> {
-    let Some(first) = courses.first() else {
+fn segments(outcome: &Outcome, series: &[Series<'_>]) -> Vec<SegmentEntry> {
+    let Some(first) = series.first() else {
         return Vec::new();
     };
     let end_s = first.time[0] + COURSE_S;
     let beginning = 0..first.time.partition_point(|t| *t <= end_s);
-    let mut windows: Vec<(f64, &Course<'_>, Rows)> = courses
+    let mut windows: Vec<(f64, &Series<'_>, Rows)> = series
         .iter()
-        .flat_map(|course| {
-            let windows = windows(course).into_iter();
-            windows.map(move |rows| (error(course, &rows), course, rows))
+        .flat_map(|one| {
+            let windows = windows(one).into_iter();
+            windows.map(move |rows| (error(one, &rows), one, rows))
         })
         .collect();
     windows.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let what = match outcome.space {
-        Space::Motion => "predictions, each started from the log",
-        Space::Torque => "stretches of torques",
+    let what = match outcome.error_model {
+        ErrorModel::OutputError => "predictions, each started from the log",
+        ErrorModel::InverseDynamics => "segments of torques",
     };
     let count = windows.len();
-    let shown = |about: String, (_, course, rows): &(f64, &Course<'_>, Rows)| {
-        stretch(outcome, course, rows.clone(), about)
+    let shown = |about: String, (_, one, rows): &(f64, &Series<'_>, Rows)| {
+        segment(outcome, one, rows.clone(), about)
     };
-    let mut all = vec![stretch(
+    let mut all = vec![segment(
         outcome,
         first,
         beginning,
@@ -213,8 +213,8 @@ fn stretches(outcome: &Outcome, courses: &[Course<'_>]) -> Vec<StretchEntry> {
     all
 }
 
-/// Error of the model with effects over rows, joint by joint in units of how much the joint varies.
-fn error(course: &Course<'_>, rows: &Rows) -> f64 {
+/// Error of the model with effects over rows, joint by joint in units of the joint's variation.
+fn error(one: &Series<'_>, rows: &Rows) -> f64 {
     let of_joint = |(measured, predicted): (&Vec<f64>, &Vec<f64>)| -> f64 {
         let pairs = measured[rows.clone()].iter().zip(&predicted[rows.clone()]);
         let squares: f64 = pairs.map(|(m, p)| (m - p).powi(2)).sum();
@@ -222,12 +222,7 @@ fn error(course: &Course<'_>, rows: &Rows) -> f64 {
     };
     #[allow(clippy::cast_precision_loss)] // some hundreds
     let count = rows.len() as f64;
-    let all: f64 = course
-        .measured
-        .iter()
-        .zip(&course.models[1])
-        .map(of_joint)
-        .sum();
+    let all: f64 = one.measured.iter().zip(&one.models[1]).map(of_joint).sum();
     (all / count).sqrt()
 }
 
@@ -238,57 +233,56 @@ pub(super) fn variance(values: &[f64]) -> f64 {
     values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count
 }
 
-fn stretch(outcome: &Outcome, course: &Course<'_>, rows: Rows, about: String) -> StretchEntry {
+fn segment(outcome: &Outcome, one: &Series<'_>, rows: Rows, about: String) -> SegmentEntry {
     let kept: Vec<usize> = rows.clone().step_by(rows.len() / POINTS + 1).collect();
-    // Where a curve begins anew it is broken.
-    let breaks =
-        |place: usize| place > 0 && course.window[kept[place]] != course.window[kept[place - 1]];
+    // A curve is broken where it restarts.
+    let breaks = |place: usize| place > 0 && one.window[kept[place]] != one.window[kept[place - 1]];
     let breaks: Vec<bool> = (0..kept.len())
-        .map(|place| outcome.space == Space::Motion && breaks(place))
+        .map(|place| outcome.error_model == ErrorModel::OutputError && breaks(place))
         .collect();
     let values = |of: &[f64]| -> Vec<Option<f64>> {
         let kept = kept.iter().map(|row| of[*row]);
         kept.map(|v| v.is_finite().then(|| rounded(v))).collect()
     };
     let predicted = |model: usize, joint: Joint| -> Vec<Option<f64>> {
-        let of_model = course.models.get(model).map(|model| values(&model[joint]));
+        let of_model = one.models.get(model).map(|model| values(&model[joint]));
         let broken = of_model.unwrap_or_default().into_iter().zip(&breaks);
         broken
             .map(|(value, breaks)| value.filter(|_| !breaks))
             .collect()
     };
-    let of_joint = |joint: Joint| TracksEntry {
+    let of_joint = |joint: Joint| SeriesEntry {
         quantity: quantity(outcome, joint),
-        measured: values(&course.measured[joint]),
+        measured: values(&one.measured[joint]),
         before: predicted(0, joint),
         after: predicted(1, joint),
         hybrid: predicted(2, joint),
     };
-    StretchEntry {
+    SegmentEntry {
         about,
-        log: course.log.name(),
-        time: kept.iter().map(|row| rounded(course.time[*row])).collect(),
-        joints: Joint::all(course.measured.len()).map(of_joint).collect(),
+        log: one.log.name(),
+        time: kept.iter().map(|row| rounded(one.time[*row])).collect(),
+        joints: Joint::all(one.measured.len()).map(of_joint).collect(),
     }
 }
 
 /// `position of joint 2 (elbow), rad`
 fn quantity(outcome: &Outcome, joint: Joint) -> String {
-    let (what, unit) = match (outcome.space, outcome.given.prismatic[joint]) {
-        (Space::Motion, false) => ("position", "rad"),
-        (Space::Motion, true) => ("position", "m"),
-        (Space::Torque, false) => ("torque", "N m"),
-        (Space::Torque, true) => ("force", "N"),
+    let (what, unit) = match (outcome.error_model, outcome.given.prismatic[joint]) {
+        (ErrorModel::OutputError, false) => ("position", "rad"),
+        (ErrorModel::OutputError, true) => ("position", "m"),
+        (ErrorModel::InverseDynamics, false) => ("torque", "N m"),
+        (ErrorModel::InverseDynamics, true) => ("force", "N"),
     };
     format!("{what} of joint {}, {unit}", label(outcome, joint))
 }
 
-fn clouds(outcome: &Outcome) -> Vec<CloudEntry> {
-    let Ok(before) = &outcome.remainder.before else {
+fn scatters(outcome: &Outcome) -> Vec<ScatterEntry> {
+    let Ok(before) = &outcome.diagnostics.before else {
         return Vec::new();
     };
-    // Both are of the same stretches, if both could be computed.
-    let after = (outcome.remainder.after.as_ref().ok())
+    // Both are of the same segments, if both could be computed.
+    let after = (outcome.diagnostics.after.as_ref().ok())
         .filter(|after| after.samples.len() == before.samples.len());
     let step = before.samples.len() / CLOUD + 1;
     let values = |of: &ResidualForce, value: &dyn Fn(&ForceSample) -> f64| -> Vec<f64> {
@@ -299,7 +293,7 @@ fn clouds(outcome: &Outcome) -> Vec<CloudEntry> {
         false => ["rad", "rad/s", "N m"],
         true => ["m", "m/s", "N"],
     };
-    let of_joint = |joint: Joint| CloudEntry {
+    let of_joint = |joint: Joint| ScatterEntry {
         joint,
         units: units(joint).map(str::to_owned),
         q: values(before, &|sample| sample.q[joint]),
@@ -317,7 +311,7 @@ fn clouds(outcome: &Outcome) -> Vec<CloudEntry> {
         .collect()
 }
 
-/// Where a variable of a joint (q, qd, tau or t) lies.
+/// The range of a joint's variable (q, qd, tau or t).
 fn range(force: &ResidualForce, joint: Joint, variable: &str) -> [f64; 2] {
     let value = |sample: &ForceSample| match variable {
         "q" => sample.q[joint],

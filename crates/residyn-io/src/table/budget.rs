@@ -4,28 +4,28 @@ use std::io::{self, Read};
 
 use residyn_core::limits::{self, unpacked_bytes};
 
-/// What was made of a file: bytes of what it holds, and 8 bytes for each number that is kept.
+/// What was unpacked from a file: its bytes, and 8 bytes for each number that is kept.
 #[derive(Debug)]
-pub(super) struct Room {
+pub(super) struct Budget {
     packed: u64,
     taken: u64,
 }
 
-impl Room {
-    /// For a file, or a part of one, of so many bytes.
+impl Budget {
+    /// For a file, or a part of one, of `packed` bytes.
     pub fn of(packed: u64) -> Self {
         Self { packed, taken: 0 }
     }
 
     /// # Errors
-    /// More than may be made of the file, now or before.
+    /// More than may be unpacked from the file, now or before.
     pub fn take(&mut self, bytes: u64) -> io::Result<()> {
         self.taken = self.taken.saturating_add(bytes);
         self.check()
     }
 
     /// # Errors
-    /// More than may be made of the file was taken.
+    /// More than may be unpacked from the file was taken.
     pub fn check(&self) -> io::Result<()> {
         match self.taken <= unpacked_bytes(self.packed) {
             true => Ok(()),
@@ -33,29 +33,29 @@ impl Room {
         }
     }
 
-    /// As [`Room::take`], for so many numbers.
+    /// As [`Budget::take`], for `count` numbers.
     ///
     /// # Errors
-    /// More than may be made of the file, now or before.
+    /// More than may be unpacked from the file, now or before.
     pub fn take_numbers(&mut self, count: u64) -> io::Result<()> {
         self.take(count.saturating_mul(8))
     }
 }
 
-/// What recordings ask for.
+/// Methods for recordings.
 #[cfg(feature = "recordings")]
-impl Room {
+impl Budget {
     /// One more file.
     pub fn extend(&mut self, packed: u64) {
         self.packed = self.packed.saturating_add(packed);
     }
 
-    /// Bytes of the files as they are.
+    /// Bytes of the files as stored.
     pub fn packed(&self) -> u64 {
         self.packed
     }
 
-    /// All that a packed part holds.
+    /// The contents of a packed part.
     ///
     /// # Errors
     /// A part that is damaged, or that holds more than there is room for.
@@ -68,18 +68,18 @@ impl Room {
     }
 }
 
-/// What a packed part holds, as it is unpacked. More than may be unpacked is an error where it is reached.
+/// The contents of a packed part, as it is unpacked. Exceeding the budget is an error once that point is reached.
 pub(super) struct Unpacked<R> {
     part: R,
-    room: Room,
+    budget: Budget,
 }
 
 impl<R> Unpacked<R> {
-    /// Of a file of so many bytes.
+    /// For a file of `packed` bytes.
     pub fn of(packed: u64, part: R) -> Self {
         Self {
             part,
-            room: Room::of(packed),
+            budget: Budget::of(packed),
         }
     }
 }
@@ -87,33 +87,34 @@ impl<R> Unpacked<R> {
 impl<R: Read> Read for Unpacked<R> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let read = self.part.read(bytes)?;
-        self.room.take(read as u64)?;
+        self.budget.take(read as u64)?;
         Ok(read)
     }
 }
 
-/// What holds more than is unpacked.
+/// The error for a file that holds more than is unpacked.
 pub fn too_large() -> io::Error {
     io::Error::other(limits::too_large())
 }
 
-#[cfg(all(test, feature = "recordings"))]
+#[cfg(test)]
+#[cfg(feature = "recordings")]
 mod tests {
-    use super::Room;
+    use super::Budget;
 
     #[test]
     fn bytes_and_numbers_share_what_may_be_made_of_a_file() {
-        let mut room = Room::of(0);
-        room.extend(1);
-        room.take(1 << 24).unwrap();
-        room.take_numbers(2).unwrap();
-        assert_eq!(room.read(&b"four"[..]).unwrap(), b"four");
-        assert!(room.read(&b""[..]).unwrap().is_empty());
-        let told = room.read(std::io::repeat(0)).unwrap_err().to_string();
+        let mut budget = Budget::of(0);
+        budget.extend(1);
+        budget.take(1 << 24).unwrap();
+        budget.take_numbers(2).unwrap();
+        assert_eq!(budget.read(&b"four"[..]).unwrap(), b"four");
+        assert!(budget.read(&b""[..]).unwrap().is_empty());
+        let message = budget.read(std::io::repeat(0)).unwrap_err().to_string();
         assert!(
-            told.contains("more than 16 MB and 20 times its size"),
-            "{told}"
+            message.contains("more than 16 MB and 20 times its size"),
+            "{message}"
         );
-        assert!(room.check().is_err() && Room::of(0).take_numbers(u64::MAX).is_err());
+        assert!(budget.check().is_err() && Budget::of(0).take_numbers(u64::MAX).is_err());
     }
 }

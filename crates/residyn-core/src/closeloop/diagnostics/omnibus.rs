@@ -9,9 +9,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::torque_noise::TorqueNoise;
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::closeloop::space::Space;
 use crate::data::statistics::{deviation, mean};
 use crate::data::{Audit, Joint};
 use crate::identify::Values;
@@ -19,11 +19,11 @@ use crate::identify::Values;
 /// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Omnibus {
-    /// Probability of residuals so smooth in time if they were noise.
+    /// Probability of residuals this smooth in time if they were noise.
     #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
-    /// Windows that were tested: those in which the logger dropped no row, since torques that nobody knows move the rig
-    /// too; where there is none, all.
+    /// Number of windows tested: those in which the logger dropped no row, since unrecorded torques move the rig too,
+    /// or all if there are none.
     pub windows: usize,
     /// Share of the residuals' variance that white noise does not explain, one a joint.
     #[serde(rename = "share")]
@@ -32,7 +32,7 @@ pub struct Omnibus {
     /// Share of the declared model's residual variance above noise that remains.
     #[serde(skip)]
     pub fraction: f64,
-    /// The same of each joint.
+    /// As `fraction`, one a joint.
     #[serde(skip)]
     pub fractions: Vec<f64>,
 }
@@ -47,9 +47,9 @@ impl Omnibus {
     }
 }
 
-/// Compare, window by window, the share of the residuals' energy that is smooth in time with that of noise of the
-/// sensors, passed through all that the residuals have passed through. The share of a window does not depend on how large the
-/// noise is, and one bad reading raises it no more than any noise does.
+/// Compare, window by window, the share of the residuals' energy that is smooth in time with that of sensor noise
+/// processed as the residuals were. The share of a window does not depend on the size of the noise, and one bad reading
+/// raises it no more than any noise does.
 pub fn omnibus(
     problem: &Problem<'_>,
     before: &Fitted,
@@ -57,9 +57,9 @@ pub fn omnibus(
     rng: &mut impl Rng,
 ) -> Omnibus {
     let chosen = chosen(problem);
-    let settings = &problem.settings.remainder;
-    match problem.space {
-        Space::Motion => {
+    let settings = &problem.settings.diagnostics;
+    match problem.error_model {
+        ErrorModel::OutputError => {
             let [declared, found] = [before, after].map(|fitted| windows(problem, fitted, &chosen));
             let residuals = |windows: &[Window]| -> Vec<DVector<f64>> {
                 windows.iter().map(|w| w.left(&w.residual)).collect()
@@ -69,7 +69,7 @@ pub fn omnibus(
                 found.iter().map(|w| w.left(&w.noise(rng))).collect()
             })
         }
-        Space::Torque => {
+        ErrorModel::InverseDynamics => {
             let [declared, found] =
                 [before, after].map(|fitted| TorqueNoise::new(problem, &fitted.model, &chosen));
             let test = Test::new(problem, declared.residuals(), found.residuals());
@@ -78,9 +78,9 @@ pub fn omnibus(
     }
 }
 
-/// The energies of two models' residuals, to be compared with those of noise.
+/// The energies of two models' residuals, to be compared with that of noise.
 struct Test {
-    /// Of the sensors, or of the torques: one a joint.
+    /// Noise of the sensors, or of the torques, one a joint.
     noise: Vec<f64>,
     /// Smooth waves over the rows of each window: orthonormal columns.
     waves: Vec<DMatrix<f64>>,
@@ -89,9 +89,10 @@ struct Test {
 }
 
 impl Test {
-    /// Of the declared model and of one with effects, over the same windows, `[row * joints + joint]`.
+    /// From residuals of the declared model and of a model with effects, `[row * joints + joint]`, over the same
+    /// windows.
     fn new(problem: &Problem<'_>, declared: &[DVector<f64>], found: &[DVector<f64>]) -> Self {
-        let slow = problem.settings.remainder.slow_waves;
+        let slow = problem.settings.diagnostics.slow_waves;
         let joints = problem.declared.joints;
         let of_window = |residual: &DVector<f64>| waves(residual.len() / joints, slow);
         let waves: Vec<DMatrix<f64>> = found.iter().map(of_window).collect();
@@ -103,7 +104,7 @@ impl Test {
         }
     }
 
-    /// `draw` gives what noise alone would leave in the windows.
+    /// `draw` gives the residuals that noise alone would leave in the windows.
     fn against(
         &self,
         draws: usize,
@@ -152,21 +153,21 @@ impl Test {
     }
 }
 
-/// The residual of one window, with the fit and the sensor there.
+/// The residual of one window, with its fit and sensor.
 struct Window {
-    /// In the order in which noise is drawn.
+    /// Joints in the order in which noise is drawn.
     joints: Vec<usize>,
     /// In m or rad, `[row * joints + joint]`.
     residual: DVector<f64>,
-    /// Basis of the residual's changes with the start state: orthonormal columns.
+    /// Basis of the residual's change with the start state: orthonormal columns.
     absorbed: DMatrix<f64>,
-    /// The model's positions, for what rounding does to them.
+    /// The model's positions, to which rounding is applied.
     positions: DVector<f64>,
-    /// Deviation of the noise before rounding and the step of the rounding (0 for none), one each a joint.
+    /// Standard deviation of the noise before rounding and rounding step (0 for none), one pair a joint.
     sensor: Vec<[f64; 2]>,
 }
 
-/// The windows in which no row is missing or, where there is none, all.
+/// The windows in which no row is missing, or all if there are none.
 fn chosen(problem: &Problem<'_>) -> Vec<usize> {
     let windows = &problem.shooting.windows;
     let is_whole = |w: &usize| {
@@ -183,20 +184,23 @@ fn chosen(problem: &Problem<'_>) -> Vec<usize> {
 }
 
 fn windows(problem: &Problem<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> {
-    let start_step = problem.settings.remainder.start_step;
+    let start_step = problem.settings.diagnostics.start_step;
     let joints = problem.declared.joints;
     let shooting = &problem.shooting;
     let dynamics = fitted.model.dynamics();
     let values = Values::of(&dynamics, problem.logs);
-    let residuals = |locals: &[Vec<f64>]| shooting.residuals(&dynamics, &values, locals);
+    let residuals =
+        |start_states: &[Vec<f64>]| shooting.residuals(&dynamics, &values, start_states);
     let sensors = sensors(problem);
     let order = problem.joints_by_motion();
-    let at = residuals(&fitted.fit.locals);
+    let at = residuals(&fitted.fit.start_states);
     let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)
         .map(|k| {
-            let mut locals = fitted.fit.locals.clone();
-            locals.iter_mut().for_each(|local| local[k] += start_step);
-            residuals(&locals)
+            let mut start_states = fitted.fit.start_states.clone();
+            start_states
+                .iter_mut()
+                .for_each(|local| local[k] += start_step);
+            residuals(&start_states)
         })
         .collect();
     chosen
@@ -223,14 +227,14 @@ fn windows(problem: &Problem<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Wind
         .collect()
 }
 
-/// Noise before rounding, and step of the rounding, of each joint in each log.
+/// Noise before rounding, and rounding step, of each joint in each log.
 fn sensors(problem: &Problem<'_>) -> Vec<Vec<[f64; 2]>> {
     let of_log = |audit: &Audit| {
         let joints = &audit.joints;
         let sensor = |j: usize| {
             let (step, seen) = (joints[j].q.resolution, joints[j].q.noise_std);
             let noise = (seen * seen - step * step / 12.0).max(0.0).sqrt();
-            // Where the audit finds neither, any noise will do: shares do not depend on its size.
+            // If the audit finds neither, any noise will do: shares do not depend on its size.
             [
                 if step > 0.0 {
                     noise
@@ -245,7 +249,7 @@ fn sensors(problem: &Problem<'_>) -> Vec<Vec<[f64; 2]>> {
     problem.audits().iter().map(of_log).collect()
 }
 
-/// The slowest waves of the discrete cosine transform of so many rows, at most half of all.
+/// The slowest waves of the discrete cosine transform over the rows, at most half of all.
 fn waves(rows: usize, slow: usize) -> DMatrix<f64> {
     #[allow(clippy::cast_precision_loss)] // few rows
     let count = rows as f64;
@@ -263,7 +267,7 @@ impl Window {
         let count = self.joints.len();
         for &j in &self.joints {
             let [noise, step] = self.sensor[j];
-            // The zero's place within a step of the encoder is unknown.
+            // The position of the zero within an encoder step is unknown.
             let phase: f64 = rng.random();
             for i in (j..all.len()).step_by(count) {
                 let added: f64 = StandardNormal.sample(rng);
@@ -279,13 +283,13 @@ impl Window {
         all
     }
 
-    /// What the fit of the start state leaves of `signal`.
+    /// The part of `signal` that the fit of the start state leaves.
     fn left(&self, signal: &DVector<f64>) -> DVector<f64> {
         signal - &self.absorbed * (self.absorbed.tr_mul(signal))
     }
 }
 
-/// Slow and total energy of a window's signal, one each a joint.
+/// Slow and total energy of a window's signal, one pair a joint.
 fn energies(joints: usize, signal: &DVector<f64>, waves: &DMatrix<f64>) -> Vec<[f64; 2]> {
     let of_joint = |j: usize| {
         let own = signal.iter().skip(j).step_by(joints).copied();
@@ -297,9 +301,9 @@ fn energies(joints: usize, signal: &DVector<f64>, waves: &DMatrix<f64>) -> Vec<[
 
 /// Energies of one set of residuals, one a joint.
 struct Energies {
-    /// Mean over the windows of the share that is smooth.
+    /// Mean of the smooth share over the windows.
     shares: Vec<f64>,
-    /// Sums over the windows.
+    /// Energies summed over the windows.
     smooth: Vec<f64>,
     all: Vec<f64>,
 }
@@ -327,7 +331,7 @@ impl Energies {
 struct NoiseShare {
     mean: f64,
     deviation: f64,
-    /// Of the energy summed over windows.
+    /// The smooth share of the energy summed over windows.
     pooled: f64,
 }
 
@@ -346,12 +350,12 @@ impl NoiseShare {
         }
     }
 
-    /// In standard deviations.
+    /// Excess over the mean, in standard deviations.
     fn excess(&self, share: f64) -> f64 {
         (share - self.mean) / self.deviation.max(f64::MIN_POSITIVE)
     }
 
-    /// Energy of white noise that is as strong as the fast waves of these residuals.
+    /// Energy of white noise as strong as the fast waves of these residuals.
     fn noise(&self, energies: &Energies, joint: usize) -> f64 {
         let rough = energies.all[joint] - energies.smooth[joint];
         rough / (1.0 - self.pooled).max(f64::MIN_POSITIVE)

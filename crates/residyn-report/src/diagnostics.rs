@@ -5,7 +5,7 @@ use super::wording::{FITTED, WITH_EFFECTS, capitalised, p_value};
 use residyn_core::closeloop::{Proposal, UNKNOWN};
 
 /// What is left of the residuals, and a formula for it.
-pub(super) fn remainder(report: &Report) -> String {
+pub(super) fn diagnostics(report: &Report) -> String {
     let norm = &report.residual_norm;
     let force = |value: Option<f64>| match value {
         Some(value) => format!("{value:.4}"),
@@ -16,14 +16,14 @@ pub(super) fn remainder(report: &Report) -> String {
     };
     format!(
         "## What is left\n\n{}\n{}\
-         Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over stretches of {} s in \
+         Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over blocks of {} s in \
          N m or N.\n\n\
          ![residual](residual.svg)\n\n{}",
         structure(report),
         network(report),
         force(norm.before),
         force(norm.after),
-        report.settings.remainder.stretch_s,
+        report.settings.diagnostics.block_s,
         (report.unexplained.proposal.as_ref())
             .map(proposed)
             .unwrap_or_default()
@@ -33,22 +33,22 @@ pub(super) fn remainder(report: &Report) -> String {
 /// What the residuals show, in a sentence or two.
 pub(super) fn structure(report: &Report) -> String {
     let left = &report.unexplained.left;
-    let settings = &report.settings.remainder;
+    let settings = &report.settings.diagnostics;
     let p = p_value(left.p_value);
     let share = 100.0 * left.omnibus.most().1;
     let structure = match left.place.as_str() {
         UNKNOWN => format!(
-            "The residuals are not white noise ({p}; {share:.0} % of their variance exceeds it), but they are no smooth \
-             function of angle, speed, torque or time. Candidates are effects with a state or a frequency of their own: \
-             joint compliance, presliding friction, a periodic disturbance."
+            "The residuals are not white noise ({p}; {share:.0} % of their variance exceeds it), but they are not a \
+             smooth function of angle, speed, torque or time. Candidates are effects with a state or a frequency of \
+             their own: joint compliance, presliding friction, a periodic disturbance."
         ),
-        place if left.is_significant() => format!("The remainder depends on {place} ({p})."),
+        place if left.is_significant() => format!("The residual depends on {place} ({p})."),
         _ if left.p_value < settings.significance => format!(
-            "The remainder has structure ({p}), but too little to matter: {share:.1} % of the residuals' variance \
+            "The residual has structure ({p}), but too little to matter: {share:.1} % of the residuals' variance \
              exceeds white noise, and no probe lowers the loss by {:.0} %.",
             100.0 * settings.noteworthy_share
         ),
-        _ => format!("The residuals cannot be told from sensor noise ({p})."),
+        _ => format!("The residuals cannot be distinguished from sensor noise ({p})."),
     };
     match left.fraction < 1.0 {
         true => format!(
@@ -59,7 +59,7 @@ pub(super) fn structure(report: &Report) -> String {
     }
 }
 
-/// That no network is used and why, where one was to be trained.
+/// Says that no network is used and why, if one was to be trained.
 pub(super) fn network(report: &Report) -> String {
     let why = match &report.network {
         None => return String::new(),
@@ -74,17 +74,17 @@ pub(super) fn network(report: &Report) -> String {
 
 fn proposed(proposal: &Proposal) -> String {
     format!(
-        "{}.\nSupported only by its fit. As an effect file, for a folder of effects of your own:\n\n\
+        "{}.\nSupported only by its fit. As an effect file, for your own folder of effects:\n\n\
          ```toml\n{}```\n\n",
         capitalised(&proposal_line(proposal)),
         proposal.file
     )
 }
 
-/// `proposal, not a finding: force on joint 1 ~ -0.0012 * qd1^3 (explains 81 % of the remainder on held-out stretches)`
+/// `proposal, not a finding: force on joint 1 ~ -0.0012 * qd1^3 (explains 81 % of the residual on held-out blocks)`
 pub(super) fn proposal_line(proposal: &Proposal) -> String {
     format!(
-        "proposal, not a finding: force on joint {} ~ {} (explains {:.0} % of the remainder on held-out stretches)",
+        "proposal, not a finding: force on joint {} ~ {} (explains {:.0} % of the residual on held-out blocks)",
         proposal.joint,
         proposal.formula,
         100.0 * proposal.explains

@@ -15,10 +15,10 @@ use residyn_core::sim::metric::assess;
 
 /// Standard normal quantile of 95 %.
 const ONE_SIDED: f64 = 1.645;
-/// Errors within this factor of the true structure's are as small.
+/// Errors within this factor of the true structure's count as equally small.
 const AS_GOOD: f64 = 1.05;
 
-/// A model with the true effects, fitted from their true values to the logs that a search has.
+/// A model with the true effects, fitted from their true values to the logs that a search uses.
 pub struct Told<'a> {
     problem: Problem<'a>,
     library: &'a Library,
@@ -27,7 +27,7 @@ pub struct Told<'a> {
     fitted: Fitted,
 }
 
-/// A model whose declared parameters have the true values, where these are known.
+/// A model whose declared parameters have their true values, if known.
 pub fn at_truth(model: &Model, declared: &BTreeMap<String, f64>) -> Model {
     let mut model = model.clone();
     for parameter in &mut model.parameters {
@@ -39,8 +39,8 @@ pub fn at_truth(model: &Model, declared: &BTreeMap<String, f64>) -> Model {
 }
 
 impl<'a> Told<'a> {
-    /// Fit the true structure; `None` where the library lacks one of the effects or the fit fails. Declared parameters
-    /// start from the true values where all are known, else from the fit of the declared model.
+    /// Fit the true structure; `None` if the library lacks one of the effects or the fit fails. Declared parameters
+    /// start from the true values if all are known, else from the fit of the declared model.
     pub fn fit(
         declared: &'a Model,
         library: &'a Library,
@@ -55,16 +55,16 @@ impl<'a> Told<'a> {
             .map(|hidden| fitted(&problem, library, hidden))
             .collect::<Option<_>>()?;
         let mut free = declared.parameters.iter().filter(|p| !p.fixed);
-        let (model, locals) = if free.all(|p| known.contains_key(&p.name)) {
-            let locals = problem.shooting.initial_locals(0);
-            (at_truth(declared, known), locals)
+        let (model, start_states) = if free.all(|p| known.contains_key(&p.name)) {
+            let start_states = problem.shooting.initial_start_states(0);
+            (at_truth(declared, known), start_states)
         } else {
             let before = problem.fit_declared().ok()?;
             problem = before.problem;
-            (before.fitted.model, before.fitted.fit.locals)
+            (before.fitted.model, before.fitted.fit.start_states)
         };
         let found = problem
-            .refit(&model.with_effects(truth), locals, None)
+            .refit(&model.with_effects(truth), start_states, None)
             .ok()?;
         Some(Self {
             problem,
@@ -85,8 +85,8 @@ impl<'a> Told<'a> {
         assess(&fitted.model.dynamics(), logs, horizons).position_rms()
     }
 
-    /// By how much the error rises without the effect at a place, what is left being fitted again, as a factor; simpler
-    /// effects that it contains stay. Infinite where that fit fails.
+    /// Factor by which the error rises without the effect at this index, after a refit of the others; simpler effects
+    /// that it contains stay. Infinite if the refit fails.
     pub fn rises_without(&self, place: usize) -> f64 {
         let mut effects = self.fitted.model.effects.clone();
         let gone = effects.remove(place);
@@ -94,21 +94,21 @@ impl<'a> Told<'a> {
             let simpler = typical(&self.problem, self.library, name, &gone);
             effects.extend(simpler.filter(|new| !effects.iter().any(|old| old.excludes(new))));
         }
-        let locals = self.fitted.fit.locals.clone();
+        let start_states = self.fitted.fit.start_states.clone();
         let other = self.fitted.model.with_effects(effects);
-        let other = self.problem.refit(&other, locals, None);
+        let other = self.problem.refit(&other, start_states, None);
         other.map_or(f64::INFINITY, |other| self.rise(&other))
     }
 
-    /// The error of another fit over that of the true structure.
+    /// The error of another fit divided by the true structure's.
     fn rise(&self, other: &Fitted) -> f64 {
         let logs = self.judged_on();
         self.error_on(logs, other) / self.error_on(logs, &self.fitted)
     }
 
-    /// Sets of effects that these logs do not tell from the true one: one effect exchanged for another of no more numbers
-    /// that it is confused with, where the true set does not have a smaller loss by more than chance (Vuong 1989), nor a
-    /// smaller error.
+    /// Sets of effects that these logs cannot distinguish from the true one: one effect is exchanged for another that
+    /// it is confused with and that has no more numbers, and the true set's loss is not smaller by more than chance
+    /// (Vuong 1989), nor is its error smaller.
     pub fn twins(&self) -> Vec<Vec<Label>> {
         let places = 0..self.fitted.model.effects.len();
         places.flat_map(|place| self.twins_at(place)).collect()
@@ -129,12 +129,12 @@ impl<'a> Told<'a> {
             .collect()
     }
 
-    /// Whether the logs do not tell the true set of effects from another.
+    /// Whether the logs cannot distinguish this set of effects from the true one.
     fn is_as_good(&self, effects: &[FittedEffect]) -> bool {
         let Fitted { model, fit } = &self.fitted;
         let other = model.with_effects(effects.to_vec());
-        let (locals, scale) = (fit.locals.clone(), Some(fit.scale));
-        let Ok(other) = self.problem.refit(&other, locals, scale) else {
+        let (start_states, scale) = (fit.start_states.clone(), Some(fit.scale));
+        let Ok(other) = self.problem.refit(&other, start_states, scale) else {
             return false;
         };
         let blocks = blocks(&self.problem.shooting);
@@ -151,7 +151,7 @@ impl<'a> Told<'a> {
         by_chance && self.rise(&other) <= AS_GOOD
     }
 
-    /// The test logs or, where values of a log's own are unknown there, the training logs.
+    /// The test logs or, if there are per-log values, which are unknown there, the training logs.
     fn judged_on(&self) -> &[Log] {
         let effects = &self.fitted.model.effects;
         let mut parameters = effects.iter().flat_map(|effect| &effect.effect.parameters);
@@ -185,7 +185,7 @@ impl<'a> Told<'a> {
     }
 }
 
-/// An effect of the library on the joint of another, at the values that are typical of it.
+/// A library effect on the joint of another, at its typical values.
 fn typical(
     problem: &Problem<'_>,
     library: &Library,
@@ -203,7 +203,7 @@ fn typical(
     Some(fitted)
 }
 
-/// The effect with its true values; `None` where the library has no such effect.
+/// The effect with its true values; `None` if the library has no such effect.
 fn fitted(problem: &Problem<'_>, library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
     if hidden.name == "parameter_shift" {
         return shift(problem.declared, hidden);
@@ -217,7 +217,7 @@ fn fitted(problem: &Problem<'_>, library: &Library, hidden: &Hidden) -> Option<F
             // Values per log start from zero.
             _ if parameter.per_log => 0.0,
             Some(value) => *value,
-            // Selects a form of the effect's formula; the rig has no such number.
+            // It selects a form of the effect's formula; the rig has no such number.
             None if parameter.whole => parameter.typical,
             None => return None,
         };

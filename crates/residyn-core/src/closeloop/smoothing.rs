@@ -1,29 +1,31 @@
 //! Over which speeds dry friction reverses, where the motion tells: grease, soft gears and the friction of simulators reverse over
-//! far wider ones than a dry bearing.
+//! far wider speeds than a dry bearing.
 
+use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::loss::Loss;
 use super::problem::Problem;
-use super::space::Space;
 use super::stage::Watch;
 use crate::data::Joint;
 use crate::expr::Program;
 
 impl Problem<'_> {
-    /// The widths of the joints' reversals with which a fitted model explains the logs better than with those of the problem, by
-    /// the share that a round of the search must, and the loss with those of the problem; `None` where there are none, or the
-    /// model file gives them, or torques are compared.
+    /// Wider smoothing velocities with which a fitted model explains the logs better than with the problem's, by at
+    /// least the gain required of a search round, and the loss with the problem's; `None` if there are none, if the
+    /// model file gives them, or if torques are compared.
     pub(super) fn wider_reversal(
         &self,
         fitted: &Fitted,
         watch: &dyn Watch,
     ) -> Option<(Vec<f64>, f64)> {
-        if self.space == Space::Torque || self.declared.sign_width.is_some() {
+        if self.error_model == ErrorModel::InverseDynamics
+            || self.declared.smoothing_velocity.is_some()
+        {
             return None;
         }
         let enough = 1.0 - self.settings.select.round_gain;
         let first = Loss::of(self, fitted).total();
-        let (mut best, mut least) = (self.sign_widths.clone(), first);
+        let (mut best, mut least) = (self.smoothing_velocities.clone(), first);
         for joint in Joint::all(self.declared.joints) {
             let before = best.clone();
             let reverses = reversing(fitted, &before);
@@ -43,16 +45,16 @@ impl Problem<'_> {
         (least < first).then_some((best, first))
     }
 
-    /// The loss of a model, fitted again with these widths.
+    /// The loss of a model, refitted with these widths.
     fn loss_with(&self, fitted: &Fitted, widths: &[f64]) -> Option<f64> {
-        let problem = self.with_sign_widths(widths.to_vec());
+        let problem = self.with_smoothing_velocities(widths.to_vec());
         let again = problem.estimate(fitted).ok()?;
         Some(Loss::of(&problem, &again).total())
     }
 }
 
-/// The program of a model whose friction reverses over these speeds: the same as with others where it has none on a joint.
+/// The program of a model with these smoothing velocities: a joint's width changes nothing if it has no dry friction.
 fn reversing(fitted: &Fitted, widths: &[f64]) -> Program {
-    let model = fitted.model.with_sign_widths(widths.to_vec());
+    let model = fitted.model.with_smoothing_velocities(widths.to_vec());
     model.dynamics().program
 }

@@ -9,7 +9,7 @@ use crate::data::{Channel, JointAudit, Log};
 use crate::identify::Values;
 use crate::model::Model;
 
-/// The residuals of a model in some windows of a problem of torques, and what noise adds to them.
+/// The torque residuals of a model in some windows of a problem, and what noise adds to them.
 pub(super) struct TorqueNoise<'a> {
     problem: &'a Problem<'a>,
     model: &'a Model,
@@ -32,7 +32,7 @@ impl<'a> TorqueNoise<'a> {
         &self.residuals
     }
 
-    /// What a draw of the noise of all sensors changes of them.
+    /// The change of the residuals with a draw of all sensors' noise.
     pub fn draw(&self, rng: &mut impl Rng) -> Vec<DVector<f64>> {
         let audits = self.problem.audits().iter();
         let order = self.problem.joints_by_motion();
@@ -56,10 +56,11 @@ fn residuals(
         .map(|&w| problem.shooting.windows[w])
         .collect();
     let noise = &problem.shooting.noise;
-    let shooting = (problem.space).shooting(logs, chosen, noise, &problem.sign_widths);
+    let shooting =
+        (problem.error_model).shooting(logs, chosen, noise, &problem.smoothing_velocities);
     let dynamics = problem.compiled(model);
     let values = Values::of(&dynamics, logs);
-    let all = shooting.residuals(&dynamics, &values, &shooting.initial_locals(0));
+    let all = shooting.residuals(&dynamics, &values, &shooting.initial_start_states(0));
     let in_units = |residuals: Vec<f64>| {
         let units = noise.iter().cycle();
         DVector::from_iterator(
@@ -70,7 +71,7 @@ fn residuals(
     all.into_iter().map(in_units).collect()
 }
 
-/// A log whose positions and torques carry as much noise once more as they seem to, drawn for the joints in this order.
+/// A log with added noise on positions and torques, as large as they seem to carry, drawn for the joints in this order.
 fn noisier(log: &Log, joints: &[JointAudit], order: &[usize], rng: &mut impl Rng) -> Log {
     let mut noisier = log.clone();
     let mut add = |values: &mut [f64], channel: &Channel| {

@@ -3,36 +3,36 @@ use std::ops::{AddAssign, Range};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::candidate::{beside, best_start, has_switch, promise_on_sample};
+use super::candidate::{beside, best_start, has_switch, screened_cost_on_sample};
 use super::folds::{Folds, predicted, step_without};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::identify::{Column, Fit, WindowTerms, as_it_stands, with_unit_diagonal};
 use crate::model::{Dynamics, EffectParameter, FittedEffect};
 
-/// What sets of effects promise beside a fitted model: its loss as a quadratic function of its own parameters and those
-/// of every candidate at once. Sets are compared on it without a fit, and candidates that help only together are seen
-/// together.
-pub struct Outlook {
+/// The predicted gain of sets of effects added to a fitted model: its loss as a quadratic function of its parameters
+/// and those of every candidate at once. Sets are compared without a fit, and candidates that help only together are
+/// found together.
+pub struct Screening {
     /// The effects that the model has beyond the declared ones, then the candidates at their best starting points.
     pub items: Vec<FittedEffect>,
-    /// How many of the items the model has.
+    /// Number of items that the model has.
     present: usize,
     /// The free values of each item.
     columns_of: Vec<Vec<usize>>,
-    /// Free values that belong to no item, and those of them that the logs determine.
+    /// Free values that belong to no item; then those of them that the logs determine.
     base: Vec<usize>,
-    told: Vec<usize>,
-    /// Of each free value: how far it is from its bounds, and from being switched off.
+    message: Vec<usize>,
+    /// Distance of each free value to its bounds; then to being switched off.
     room: Vec<[f64; 2]>,
     to_zero: Vec<f64>,
     groups_of: Vec<usize>,
-    stretches: Vec<WindowTerms>,
+    blocks: Vec<WindowTerms>,
     groups: Vec<WindowTerms>,
     all: WindowTerms,
-    /// What the logs alone tell.
+    /// Information of the logs alone, without the prior.
     information: DMatrix<f64>,
-    /// Of the settings.
+    /// From the settings.
     own_information: f64,
     kept_information: f64,
 }
@@ -43,13 +43,13 @@ pub type Set = Vec<usize>;
 /// The predicted minimum of the loss for one set.
 struct Minimum {
     free: Vec<usize>,
-    /// Displacement of the values that are not free: those of effects that are dropped, and those that stop at a bound.
+    /// Displacement of the values that are not free: those of dropped effects, and those that stop at a bound.
     held: DVector<f64>,
     moved: Vec<usize>,
 }
 
-impl Outlook {
-    /// The loss of `fitted` and of all candidates beside it; `None` where the model diverges.
+impl Screening {
+    /// The loss of `fitted` with all candidates; `None` if the model diverges.
     pub fn of(problem: &Problem<'_>, fitted: &Fitted, candidates: &[FittedEffect]) -> Option<Self> {
         let options: Vec<FittedEffect> = candidates
             .par_iter()
@@ -73,7 +73,7 @@ impl Outlook {
         let added = problem.declared.effects.len()..model.effects.len();
         let places: Vec<Range<usize>> = added.clone().map(|k| model.place_of(k)).collect();
         let present = problem.added(&fitted.model).len();
-        // Beside an absent effect the values that give it its shape change nothing.
+        // The values that shape an absent effect change nothing.
         let shapes = |k: &usize| {
             let item = places.iter().position(|place| place.contains(k));
             item.is_some_and(|item| {
@@ -83,8 +83,8 @@ impl Outlook {
         };
         let mut active = problem.active(&dynamics);
         active.retain(|k| !shapes(k));
-        let (locals, scale) = (fitted.fit.locals.clone(), fitted.fit.scale);
-        let fit = as_it_stands(&problem.shooting, &dynamics, &active, locals, scale).ok()?;
+        let (start_states, scale) = (fitted.fit.start_states.clone(), fitted.fit.scale);
+        let fit = as_it_stands(&problem.shooting, &dynamics, &active, start_states, scale).ok()?;
         let items = model.effects[added].to_vec();
         Some(Self::from_fit(
             problem, &dynamics, &fit, items, &places, present,
@@ -121,11 +121,11 @@ impl Outlook {
             if is_switch { -values.get(*column) } else { 0.0 }
         };
         let folds = Folds::of(problem);
-        let (stretches, groups) = folds.equations(fit);
+        let (blocks, groups) = folds.equations(fit);
         let base: Vec<usize> = (0..fit.columns.len()).filter(is_base).collect();
-        let told = |i: &&usize| problem.is_told(fit.columns[**i].parameter);
+        let message = |i: &&usize| problem.is_identifiable(fit.columns[**i].parameter);
         Self {
-            told: base.iter().filter(told).copied().collect(),
+            message: base.iter().filter(message).copied().collect(),
             base,
             room: fit.columns.iter().map(room).collect(),
             to_zero: fit.columns.iter().map(to_zero).collect(),
@@ -137,7 +137,7 @@ impl Outlook {
             items,
             present,
             columns_of,
-            stretches,
+            blocks,
             groups,
         }
     }
@@ -152,7 +152,7 @@ impl Outlook {
         set.iter().map(|&item| self.items[item].clone()).collect()
     }
 
-    /// Predicted loss of a set on each stretch, with the parameters that a fit without the stretch's group would give.
+    /// Predicted loss of a set on each block, with the parameters that a fit without the block's group would give.
     pub fn losses(&self, set: &[usize]) -> Option<Vec<f64>> {
         let minimum = self.minimum(set)?;
         let (free, moved) = (&minimum.free, &minimum.moved);
@@ -179,16 +179,10 @@ impl Outlook {
             let hessian = sub(&part.hessian, &rows, &rows);
             predicted(part.cost, &gradient, &hessian, step)
         };
-        Some(
-            self.stretches
-                .iter()
-                .zip(&self.groups_of)
-                .map(loss)
-                .collect(),
-        )
+        Some(self.blocks.iter().zip(&self.groups_of).map(loss).collect())
     }
 
-    /// Which values of a set are free at the minimum of the loss, and where the others stand.
+    /// Which values of a set are free at the minimum of the loss, and the values of the others.
     fn minimum(&self, set: &[usize]) -> Option<Minimum> {
         let mut free = self.base.clone();
         let mut held = DVector::zeros(self.room.len());
@@ -204,9 +198,9 @@ impl Outlook {
             }
         }
         let mut minimum = Minimum { free, held, moved };
-        let told = [&self.told, &minimum.free[self.base.len()..]].concat();
-        let information = sub(&self.information, &told, &told);
-        if !tells_apart(&information, self.told.len(), self.own_information) {
+        let message = [&self.message, &minimum.free[self.base.len()..]].concat();
+        let information = sub(&self.information, &message, &message);
+        if !distinguishes(&information, self.message.len(), self.own_information) {
             return None;
         }
         loop {
@@ -245,13 +239,14 @@ impl Outlook {
     }
 }
 
-/// The candidates that are compared at once: all or, of more than there is memory for, those that promise most alone.
+/// The candidates that are compared at once: all or, if memory does not suffice, those with the largest predicted gain
+/// alone.
 fn together(
     problem: &Problem<'_>,
     fitted: &Fitted,
     options: Vec<FittedEffect>,
 ) -> Vec<FittedEffect> {
-    // Each window's as they come and without its own values, and those of stretches.
+    // Each window's equations with and without its own free values, and those of the blocks.
     let equations = 3 * problem.shooting.windows.len().max(1);
     #[allow(
         clippy::cast_precision_loss,
@@ -267,12 +262,12 @@ fn together(
     if options.iter().map(switches).sum::<usize>() <= room {
         return options;
     }
-    let promises = options.par_iter().enumerate();
-    let promises =
-        promises.filter_map(|(k, option)| Some((promise_on_sample(problem, fitted, option)?, k)));
-    let mut promises: Vec<(f64, usize)> = promises.collect();
-    promises.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let fits = promises.iter().scan(0, |sum, (_, k)| {
+    let predicted = options.par_iter().enumerate();
+    let predicted = predicted
+        .filter_map(|(k, option)| Some((screened_cost_on_sample(problem, fitted, option)?, k)));
+    let mut predicted: Vec<(f64, usize)> = predicted.collect();
+    predicted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let fits = predicted.iter().scan(0, |sum, (_, k)| {
         *sum += switches(&options[*k]);
         (*sum <= room).then_some(*k)
     });
@@ -281,9 +276,9 @@ fn together(
     kept.into_iter().map(|k| options[k].clone()).collect()
 }
 
-/// Whether the logs tell the values after the first `base` ones from each other and from those: the information of each
-/// that is left when those before it are free, as a share of its own, is at least so much.
-pub fn tells_apart(matrix: &DMatrix<f64>, base: usize, least: f64) -> bool {
+/// Whether the logs distinguish the values after the first `base` from each other and from those: the share of the
+/// information on each that is left when the values before it are free must exceed `least`.
+pub fn distinguishes(matrix: &DMatrix<f64>, base: usize, least: f64) -> bool {
     let (mut scaled, _) = with_unit_diagonal(matrix);
     for i in 0..scaled.nrows() {
         scaled[(i, i)] += RIDGE;
@@ -301,7 +296,7 @@ fn sub(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64>
     })
 }
 
-/// Smallest information of a direction, in units in which each value alone has 1: items that say the same share it.
+/// Smallest information on a direction, in units in which each value alone has 1: redundant items share it.
 const RIDGE: f64 = 1e-9;
 
 fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {

@@ -2,7 +2,7 @@
 
 use super::fit::NOTHING;
 use super::problem::Problem;
-use super::select::usual_friction;
+use super::select::baseline_friction;
 use crate::data::Log;
 use crate::data::statistics::{mean, upper_median};
 use crate::identify::{Window, cut, fit_torques};
@@ -11,17 +11,17 @@ use crate::sim::FIT_S;
 use crate::sim::metric::{errors_in, torque_error};
 
 impl Problem<'_> {
-    /// Whether a controller prescribes the motion, so that the declared model, with the friction that most machines have,
-    /// explains far more of the torques than of half a second of open-loop motion, or so many joints move that no other errors
-    /// can be lowered in time. Never of a model that gives accelerations, nor of one driven by commands.
+    /// Whether a controller prescribes the motion, so that the declared model, with baseline friction, explains far
+    /// more of the torques than of half a second of open-loop motion, or the joints are too many for a fit of the
+    /// motion in reasonable time. Never for a model that gives accelerations, nor for one driven by commands.
     pub(super) fn is_prescribed(&self) -> bool {
         self.tells_more_of_torques().unwrap_or(false)
     }
 
-    /// `None` where there are no torques to tell, or no motion.
+    /// `None` if there are no torques to compare, or no motion.
     fn tells_more_of_torques(&self) -> Option<bool> {
         let own = &self.declared.effects;
-        let friction = usual_friction(self);
+        let friction = baseline_friction(self);
         let model = self
             .declared
             .with_effects([own, friction.as_slice()].concat());
@@ -34,7 +34,7 @@ impl Problem<'_> {
         if self.motion_error(&fitted.model)? < far {
             return Some(false);
         }
-        // Torques may be fitted well by what cannot move like the rig.
+        // A model may fit the torques well and still not move like the rig.
         let by_motion = Problem {
             declared: &model,
             library: &NOTHING,
@@ -44,8 +44,8 @@ impl Problem<'_> {
         Some(self.motion_error(&by_motion.fitted.model)? >= far)
     }
 
-    /// The open-loop error of a model over a few windows of its logs, as a share of how far the joints move in them; of the
-    /// joints that move at all, `None` where none does.
+    /// The open-loop error of a model over a few windows of its logs, as a share of how far the joints move in them,
+    /// over the joints that move at all; `None` if none does.
     fn motion_error(&self, model: &Model) -> Option<f64> {
         let windows = cut(self.logs, self.settings.fit.window_s);
         let every = windows.len().div_ceil(self.settings.fit.sample_windows);
@@ -67,7 +67,7 @@ impl Problem<'_> {
     }
 }
 
-/// Sum over the rows of a window of the squared way from its start.
+/// Squared distance from the start of a window, summed over its rows.
 fn way(log: &Log, window: &Window, joint: usize) -> f64 {
     let q = &log.q[joint][window.first..=window.last];
     q.iter().map(|at| (at - q[0]).powi(2)).sum()

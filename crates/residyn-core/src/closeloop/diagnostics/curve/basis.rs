@@ -2,8 +2,8 @@ use nalgebra::DMatrix;
 
 use crate::data::statistics::quantile;
 
-/// Splines along a variable: cubic, on knots at equal distances (Eilers and Marx 1996). Enough for the shapes of
-/// friction and of a cogging torque; the penalty smooths what is too many.
+/// Splines along a variable: cubic, on equidistant knots (Eilers and Marx 1996). Enough for the shapes of friction and
+/// of a cogging torque; the penalty smooths the excess.
 pub(super) const SPLINES: usize = 14;
 
 /// Cubic splines over one variable, as functions whose mean over the samples is zero.
@@ -12,12 +12,12 @@ pub(super) struct Basis {
     high: f64,
     /// `[sample, spline]`, centred.
     pub columns: DMatrix<f64>,
-    /// What was taken off to centre them.
+    /// The column means, subtracted to centre them.
     means: Vec<f64>,
 }
 
 impl Basis {
-    /// `None` where the values do not differ.
+    /// `None` if the values do not differ.
     pub fn over(values: Vec<f64>, quantiles: [f64; 2]) -> Option<Self> {
         let [low, high] = quantiles.map(|share| quantile(&values, share));
         if !(high - low > 1e-9 * (1.0 + high.abs().max(low.abs()))) {
@@ -41,7 +41,7 @@ impl Basis {
         })
     }
 
-    /// So many values at equal distances over the range of the basis.
+    /// `count` equidistant values over the range of the basis.
     #[allow(clippy::cast_precision_loss)] // few points
     pub fn points(&self, count: usize) -> impl Iterator<Item = f64> {
         let place = move |point: usize| point as f64 / (count - 1) as f64;
@@ -58,7 +58,7 @@ impl Basis {
     }
 }
 
-/// The cubic splines at a place from 0 to 1, constant beyond.
+/// The cubic splines at a position from 0 to 1, constant beyond.
 fn splines(place: f64) -> [f64; SPLINES] {
     #[allow(clippy::cast_precision_loss)] // few splines
     let pieces = (SPLINES - 3) as f64;

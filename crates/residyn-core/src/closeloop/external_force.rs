@@ -1,50 +1,55 @@
 //! Forces that no column holds: a person pushes, a cable pulls, a limb touches. The fitted model follows the log there
 //! only with a further torque that is far beyond what it needs elsewhere.
 
+use super::diagnostics::ForceSample;
 use super::problem::Problem;
-use super::remainder::ForceSample;
 use super::settings::NoteSettings;
 use crate::data::statistics::{SIGMA_PER_MAD, median};
 use crate::data::{Audit, Finding, Interval, Joint, Severity};
 
-/// One push on one joint.
+/// One external force on one joint.
 #[derive(Debug)]
-struct Push {
+struct ExternalForce {
     log: usize,
     joint: Joint,
     span: Interval,
-    /// Largest further force, N m or N.
+    /// Largest additional force, N m or N.
     force: f64,
-    /// The same over what the model needs elsewhere.
+    /// Its ratio to what the model needs elsewhere.
     times: f64,
 }
 
-/// Add to the audits of the problem's logs where something pushed, as far as the residual forces of a fitted model tell.
-pub(super) fn tell_pushes(problem: &Problem<'_>, forces: &[ForceSample], audits: &mut [Audit]) {
+/// Report in the audits of the problem's logs where an external force acted, judged by the residual forces of a fitted
+/// model.
+pub(super) fn report_external_forces(
+    problem: &Problem<'_>,
+    forces: &[ForceSample],
+    audits: &mut [Audit],
+) {
     let settings = &problem.settings.notes;
-    let stretch_s = problem.settings.remainder.stretch_s;
+    let block_s = problem.settings.diagnostics.block_s;
     for joint in Joint::all(problem.declared.joints) {
         let least = settings.push_torque * problem.top_torque[joint];
-        for push in pushes(forces, joint, (stretch_s, least), settings) {
+        for push in pushes(forces, joint, (block_s, least), settings) {
             audits[push.log].add(push.finding(&problem.logs[push.log].name()));
         }
     }
 }
 
-/// The pushes on a joint of at least so much force, in stretches of `stretch_s`.
+/// The external forces of at least `least` on a joint, in blocks of `block_s`.
 fn pushes(
     samples: &[ForceSample],
     joint: Joint,
-    (stretch_s, least): (f64, f64),
+    (block_s, least): (f64, f64),
     settings: &NoteSettings,
-) -> Vec<Push> {
+) -> Vec<ExternalForce> {
     let force = |sample: &ForceSample| sample.force[joint];
     let sizes: Vec<f64> = samples.iter().map(|sample| force(sample).abs()).collect();
     let deviation = SIGMA_PER_MAD * median(&sizes);
     let is_far =
         |sample: &ForceSample| force(sample).abs() > settings.push_edge_deviations * deviation;
     let goes_on = |a: &ForceSample, b: &ForceSample| {
-        let adjacent = a.log == b.log && b.time_s - a.time_s < 1.5 * stretch_s;
+        let adjacent = a.log == b.log && b.time_s - a.time_s < 1.5 * block_s;
         adjacent && is_far(a) && is_far(b)
     };
     let push = |run: &[ForceSample]| {
@@ -52,14 +57,14 @@ fn pushes(
             .iter()
             .map(|sample| force(sample).abs())
             .fold(0.0, f64::max);
-        let is_push = run.len() >= settings.push_stretches
+        let is_push = run.len() >= settings.external_force_blocks
             && largest > least.max(settings.push_deviations * deviation);
-        is_push.then(|| Push {
+        is_push.then(|| ExternalForce {
             log: run[0].log,
             joint,
             span: Interval {
-                start_s: run[0].time_s - 0.5 * stretch_s,
-                end_s: run[run.len() - 1].time_s + 0.5 * stretch_s,
+                start_s: run[0].time_s - 0.5 * block_s,
+                end_s: run[run.len() - 1].time_s + 0.5 * block_s,
             },
             force: largest,
             times: largest / deviation,
@@ -68,7 +73,7 @@ fn pushes(
     samples.chunk_by(goes_on).filter_map(push).collect()
 }
 
-impl Push {
+impl ExternalForce {
     fn finding(&self, log: &str) -> Finding {
         let rounded = |t: f64| (100.0 * t).round() / 100.0;
         let span = Interval {
@@ -89,7 +94,7 @@ impl Push {
 mod tests {
     use super::*;
 
-    /// Forces of one joint in stretches of 0.15 s.
+    /// Forces of one joint in blocks of 0.15 s.
     fn samples(force: impl Fn(usize) -> f64) -> Vec<ForceSample> {
         let sample = |k: usize| ForceSample {
             log: 0,

@@ -10,15 +10,15 @@ use self::basis::Basis;
 use super::force::ForceSample;
 use crate::closeloop::settings::CurveSettings;
 use crate::data::Joint;
-use crate::identify::{BLOCK_S, stretches};
+use crate::identify::{BLOCK_S, blocks_of_times};
 
-/// The residual force of a joint as a smooth curve over one variable, without the shares of the other variables.
+/// The residual force of a joint as a smooth curve over one variable, without the contributions of the other variables.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Curve {
     pub joint: Joint,
     /// `q1`, `qd1`, `tau1` or `t`.
     pub variable: String,
-    /// Of the variable.
+    /// The unit of the variable.
     pub unit: String,
     #[schemars(length(min = 2))]
     pub x: Vec<f64>,
@@ -35,7 +35,7 @@ pub struct Curve {
 /// A variable that a force may depend on.
 struct Variable {
     name: &'static str,
-    /// On a turning joint and on a sliding one.
+    /// The units on a turning joint and on a sliding joint.
     units: [&'static str; 2],
     value: fn(&ForceSample, Joint) -> f64,
 }
@@ -63,17 +63,17 @@ const VARIABLES: [Variable; 4] = [
     },
 ];
 
-/// One curve for each joint and each variable that takes more than one value; none for logs too short to give
-/// a band. The curves of a joint are fitted together, so that none takes on the shape of another.
+/// One curve for each joint and each variable that takes more than one value; no curves if the logs are too short to
+/// give a confidence band. The curves of a joint are fitted together, so that no curve takes on the shape of another.
 pub(super) fn curves(
     samples: &[ForceSample],
     prismatic: &[bool],
     settings: &CurveSettings,
 ) -> Vec<Curve> {
-    let blocks = stretches(samples.iter().map(|s| (s.log, s.time_s)), BLOCK_S);
+    let blocks = blocks_of_times(samples.iter().map(|s| (s.log, s.time_s)), BLOCK_S);
     if blocks
         .last()
-        .is_none_or(|last| last + 1 < settings.fewest_stretches)
+        .is_none_or(|last| last + 1 < settings.fewest_blocks)
     {
         return Vec::new();
     }
@@ -134,7 +134,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Noise of neighbouring stretches has something in common.
+    /// The noise of neighbouring blocks is correlated.
     fn samples(force: fn(f64, f64) -> f64, noise: f64, rng: &mut impl Rng) -> Vec<ForceSample> {
         let mut carried = 0.0;
         (0..400)

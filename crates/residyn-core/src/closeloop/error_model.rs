@@ -1,0 +1,71 @@
+//! What a model is compared with the logs by.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::data::Log;
+use crate::identify::{Shooting, Window};
+use crate::model::{Dynamics, Effect, Entry, Model};
+
+/// The errors that fits minimise, effects are selected by and the report compares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorModel {
+    /// Errors of the positions that the logged torques lead to, integrated open loop.
+    OutputError,
+    /// Errors of the torques that the logged motion needs.
+    InverseDynamics,
+}
+
+impl ErrorModel {
+    /// Whether these errors can show an effect. In a motion, in which each joint moves the others, a motor between two
+    /// joints is too much like the links' inertia. Torques are computed from the motion as it was read, and the torque
+    /// that acts must determine the command: an effect that explains any command would always fit.
+    pub(super) fn shows(self, effect: &Effect) -> bool {
+        match self {
+            Self::OutputError => !effect.is_coupling(),
+            Self::InverseDynamics => {
+                !matches!(effect.entry, Entry::Reading(_)) && effect.distinguishes_command()
+            }
+        }
+    }
+
+    /// In how many parts a model with `joints` joints is judged: in a motion each joint moves the others, whereas
+    /// torque errors are separate for each joint.
+    pub(super) fn parts(self, joints: usize) -> usize {
+        match self {
+            Self::OutputError => 1,
+            Self::InverseDynamics => joints,
+        }
+    }
+
+    /// A model compiled for these errors.
+    ///
+    /// # Panics
+    /// For the torques of a model that gives accelerations: closing the loop rejects such models.
+    pub(super) fn compile(self, model: &Model) -> Dynamics {
+        match self {
+            Self::OutputError => model.dynamics(),
+            Self::InverseDynamics => {
+                (model.smoothed_torque_balance()).expect("the model has torques")
+            }
+        }
+    }
+
+    /// These windows of logs, whose joints have this noise, in rad (or m) or in N m (or N), and these smoothing
+    /// velocities.
+    pub(super) fn shooting<'l>(
+        self,
+        logs: &'l [Log],
+        windows: Vec<Window>,
+        noise: &[f64],
+        smoothing_velocities: &[f64],
+    ) -> Shooting<'l> {
+        match self {
+            Self::OutputError => Shooting::new(logs, windows, noise),
+            Self::InverseDynamics => {
+                Shooting::of_torques(logs, windows, noise, smoothing_velocities)
+            }
+        }
+    }
+}
