@@ -1,4 +1,4 @@
-//! What the engines cost. `cargo bench` runs all of it; `benches/compare` sets it beside JAX and PyTorch.
+//! The cost of the engines. `cargo bench` runs all of it; `benches/compare` compares it with JAX and PyTorch.
 //!
 //! The work matches `benches/peers.py`: the same models and the same numbers of transitions, candidates and steps.
 

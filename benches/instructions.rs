@@ -1,5 +1,5 @@
-//! One piece of work, again and again, for a count of the instructions that it takes: `benches/instructions` runs this
-//! under valgrind. Nothing here depends on time, on addresses or on the number of cores.
+//! One piece of work, repeated so that its instructions can be counted: `benches/instructions` runs this under
+//! valgrind. Nothing here depends on time, on addresses or on the number of cores.
 //!
 //!     instructions WORK TIMES
 

@@ -1,4 +1,4 @@
-//! Chains of many joints: their equations beside those of Pinocchio and MuJoCo.
+//! Chains of many joints: their equations compared with those of Pinocchio and MuJoCo.
 
 use std::fs;
 use std::path::PathBuf;
@@ -172,7 +172,7 @@ fn the_same_motion_of_a_measured_arm_is_reported() {
         text(&logs[1]),
     ]);
     assert!(
-        said.contains("the motion is that of measurements_1.csv once more"),
+        said.contains("the motion repeats that of measurements_1.csv"),
         "{said}"
     );
 }

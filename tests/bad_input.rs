@@ -1,4 +1,4 @@
-//! Bad input gets one clear error that names the place and the remedy, exit status 2, and nothing half written.
+//! Bad input gives one clear error that names the place and the remedy, exit status 2, and no half-written files.
 
 use std::fs;
 
@@ -125,7 +125,7 @@ fn errors_in_model_files_name_line_column_and_a_similar_name() {
         (
             "positive = true",
             "bounds = [5, 6]",
-            &["line 8", "outside of its bounds"],
+            &["line 8", "outside its bounds"],
         ),
     ];
     for (from, to, parts) in cases {
@@ -143,7 +143,7 @@ fn an_unknown_effect_in_a_model_file_suggests_a_similar_one() {
     let joint = "[[effect]]\nname = \"coulomb_friction\"\njoint = 2\nF_c = 0.1\n\n[energy]";
     says(
         &model_message("[energy]", joint),
-        &["`joint` is a number from 1 to 1"],
+        &["`joint` must be a number from 1 to 1"],
     );
     let parameter = "[[effect]]\nname = \"coulomb_friction\"\njoint = 1\nFc = 0.1\n\n[energy]";
     says(
@@ -164,15 +164,15 @@ fn an_effect_that_cannot_act_is_refused() {
     );
     says(
         &effect("name = \"viscous_friction\"\njoint = 1\nb = -1"),
-        &["b = -1 lies outside of 0 to inf"],
+        &["b = -1 is outside 0 to inf"],
     );
     let twice = "name = \"viscous_friction\"\njoint = 1\nb = 1";
     says(
         &effect(&format!("{twice}\n[[effect]]\n{twice}")),
-        &["acts on joint 1 already"],
+        &["already acts on joint 1"],
     );
     let late = "name = \"actuator_delay\"\njoint = 1\nd = 0.2";
-    says(&effect(late), &["d = 0.2 lies outside of 0 to 0.1"]);
+    says(&effect(late), &["d = 0.2 is outside 0 to 0.1"]);
     says(
         &model_message("C_i = {", "tau1 = {"),
         &["the name `tau1` is taken"],
@@ -189,7 +189,7 @@ fn per_takes_no_value_but_log() {
         &refuses(&["list", "effects", "--effects", text(&scratch.path(""))]),
         &[
             "zero.toml, line 7, column 42",
-            "`per` is \"log\"",
+            "`per` must be \"log\"",
             "\"week\"",
         ],
     );
@@ -204,7 +204,7 @@ fn only_parameters_per_log_take_values_of_single_logs() {
     );
     says(
         &effect("name = \"sensor_offset\"\njoint = 1\nq_z = { value = 0, logs = { a = 3 } }"),
-        &["line 13", "q_z = 3 lies outside of -0.5 to 0.5"],
+        &["line 13", "q_z = 3 is outside -0.5 to 0.5"],
     );
 }
 
@@ -246,7 +246,7 @@ fn unknown_effects_and_parameters_of_a_simulation_are_named() {
     );
     says(
         &simulate("coulomb_friction@3=0.1"),
-        &["`joint` is from 1 to 1"],
+        &["`joint` must be from 1 to 1"],
     );
     says(
         &simulate("coulomb_friction=much"),

@@ -1,5 +1,5 @@
-//! Nothing that is given breaks the program: what is too deep, too large or without an end is refused at once, with the limit
-//! and the place, and what leaves the finite numbers is told.
+//! No input breaks the program: input that is too deep, too large or endless is refused at once, with the limit and the
+//! place, and numbers that cease to be finite are reported.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -343,7 +343,7 @@ fn numbers_in_files_are_finite() {
         let model = scratch.model("model.toml", "value = 15.0", &format!("value = {number}"));
         says(
             &refuses(&["check", &model]),
-            &["model.toml, line 7, column 17", "no finite number"],
+            &["model.toml, line 7, column 17", "not a finite number"],
         );
         let recipe = scratch.changed(
             "smoke/train-pendulum.toml",
@@ -373,7 +373,7 @@ fn names_are_those_that_formulas_can_use() {
         let model = scratch.model("model.toml", "[parameters]", &named);
         says(
             &refuses(&["check", &model]),
-            &["model.toml, line 7", "none that formulas can use"],
+            &["model.toml, line 7", "cannot be used in formulas"],
         );
     }
 }
@@ -426,7 +426,7 @@ fn a_description_names_no_file_but_the_one_beside_it() {
         let mut other = said.clone();
         other["weights"] = weights.into();
         let file = scratch.file("sub/model.json", other.to_string());
-        says(&import(&file), &["sub/model.json", "no file beside it"]);
+        says(&import(&file), &["sub/model.json", "in another folder"]);
     }
     // A path from the user may be a link, but it must be finite.
     for name in ["weights.safetensors", "model.toml", "checkpoint.json"] {
@@ -470,7 +470,7 @@ fn a_description_of_other_joints_is_refused() {
             &message,
             &[
                 "line 4",
-                &format!("`joints` is from 1 to 12, found {joints}"),
+                &format!("`joints` must be from 1 to 12, found {joints}"),
             ],
         );
     }
@@ -613,7 +613,7 @@ fn definitions_in_a_circle_are_shown_as_one() {
         let message = refuses(&["check", &model]);
         says(
             &message,
-            &["model.toml, line 14", "`a` is defined by itself", circle],
+            &["model.toml, line 14", "defined in terms of itself", circle],
         );
     }
 }
@@ -669,7 +669,7 @@ fn descriptions_of_very_many_parts_are_refused_at_once() {
         &new("chain.urdf", robot(|k| k)),
         &["chain.urdf, line 203", "behind more than 200 joints"],
     );
-    says(&new("star.urdf", robot(|_| 0)), &["no joint that moves"]);
+    says(&new("star.urdf", robot(|_| 0)), &["no joint moves"]);
     for name in ["a", "xmlns:a"] {
         let attributes: String = (0..100_000).map(|k| format!(" {name}{k}=\"b\"")).collect();
         says(
@@ -699,7 +699,7 @@ fn a_bag_whose_messages_are_computed_is_refused() {
     bag.execute_batch(endless).unwrap();
     says(
         &refuses(&["audit", text(&path)]),
-        &["run.db3", "`messages` is no plain table"],
+        &["run.db3", "`messages` is not a plain table"],
     );
 }
 
@@ -728,7 +728,7 @@ fn a_simulation_that_would_not_end_is_refused() {
     let message = refuses(&["simulate", "--plant", &plant, "--out", &scratch.out()]);
     says(
         &message,
-        &["slow.toml", "`recording.duration_s` is at most 1e5 s"],
+        &["slow.toml", "`recording.duration_s` must be at most 1e5 s"],
     );
 }
 

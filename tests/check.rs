@@ -1,4 +1,4 @@
-//! What `residyn check` finds in model files, and that it finds nothing in those that are shipped.
+//! What `residyn check` finds in model files, and that it finds nothing in the shipped ones.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -128,14 +128,14 @@ const BROKEN: &[(&str, [&str; 2], Kind, usize, &str)] = &[
         ["\"m2*lc2^2 + I2\"]", "\"I2/(q1 + q2)\"]"],
         Kind::Mass,
         23,
-        "has an entry that is no number, at q1 = 0.0000, q2 = 0.0000",
+        "has an entry that is not a number, at q1 = 0.0000, q2 = 0.0000",
     ),
     (
         "acrobot",
         ["(qd2 + 2*qd1)", "(qd2 - 2*qd1)"],
         Kind::Power,
         24,
-        "in products of velocities take ",
+        "the velocity-product terms of `bias` take ",
     ),
     (
         "acrobot",
@@ -149,7 +149,7 @@ const BROKEN: &[(&str, [&str; 2], Kind, usize, &str)] = &[
         ["G*sin(q1)\"]", "G*sin(q1)/kd\"]"],
         Kind::Units,
         18,
-        "entry 1 of `bias` is `G*sin(q1)/kd` [1/s], and should be in [N m]",
+        "entry 1 of `bias` is `G*sin(q1)/kd` [1/s], but should be in [N m]",
     ),
     (
         "pendulum",
@@ -170,7 +170,7 @@ const BROKEN: &[(&str, [&str; 2], Kind, usize, &str)] = &[
         ["[dynamics]", "sign = { value = 1.0 }\n[dynamics]"],
         Kind::Name,
         10,
-        "`sign` is a function",
+        "`sign` is also a function",
     ),
     (
         "drive",
@@ -210,9 +210,9 @@ fn parameters_of_effects_are_looked_at() {
     let found = model.check(&mut rng(0)).findings;
     for words in [
         "the formula of drag does not use its parameter `d`",
-        "the formula of drag is `-c*qd*abs(qd)*sin(q)` [kg m^2/s^4], and should be in [N m]",
-        "the parameter `q` of drag hides what formulas know by that name",
-        "`c1` is declared, so that this parameter of drag on joint 1 is called `drag_c1`",
+        "the formula of drag is `-c*qd*abs(qd)*sin(q)` [kg m^2/s^4], but should be in [N m]",
+        "the parameter `q` of drag hides the quantity that formulas know by that name",
+        "`c1` is already declared, so this parameter of drag on joint 1 is called `drag_c1`",
     ] {
         let says = |finding: &Finding| finding.text.contains(words);
         assert!(found.iter().any(says), "{words}: {found:?}");
@@ -243,7 +243,7 @@ fn the_exit_status_says_whether_something_was_found() {
     fs::write(&file, drive.replace("value = 1.0", "value = -1.0")).unwrap();
     let said = refuses(&["check", text(&file)]);
     assert!(
-        said.contains("rig.toml, line 8") && said.contains("outside of its bounds"),
+        said.contains("rig.toml, line 8") && said.contains("outside its bounds"),
         "{said}"
     );
 }

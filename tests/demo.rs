@@ -1,4 +1,4 @@
-//! The demo: an effect that the model does not declare is named, sized and worth its place.
+//! The demo: an effect that the model does not declare is named and sized, and earns its place.
 
 use std::sync::OnceLock;
 

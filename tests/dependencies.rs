@@ -1,5 +1,5 @@
-//! Every direct dependency has a row in docs/dependencies.toml that says why it is trusted, and what the row says of its
-//! version, licence and powers is so.
+//! Every direct dependency has a row in docs/dependencies.toml that says why it is trusted and is right about its
+//! version, licence and powers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

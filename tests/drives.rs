@@ -1,4 +1,4 @@
-//! Rigs that are driven by commands: servos under position targets, motors under volts.
+//! Rigs driven by commands: servos with position targets, motors under voltage.
 
 use std::fs;
 use std::path::{Path, PathBuf};

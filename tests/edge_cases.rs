@@ -1,5 +1,5 @@
-//! Odd but valid input: every outcome is an answer or one clear error, and no number beyond the finite ones is given without
-//! a word.
+//! Odd but valid input: every outcome is an answer or one clear error, and no number that is not finite goes
+//! unmentioned.
 
 use std::fs;
 use std::path::Path;
@@ -104,7 +104,7 @@ fn logs_of_few_and_far_rows_get_an_answer() {
         "--out",
         &out,
     ]);
-    says(&message, &["the logs give no window to fit"]);
+    says(&message, &["the logs contain no window to fit"]);
     closed(
         &scratch,
         &["--model", "pendulum", "--train", &log, "--test", &sparse],
@@ -191,7 +191,7 @@ fn torques_of_any_size_are_told_in_numbers() {
     let message = succeeds(&[
         "evaluate", "--model", &torques, "--test", &passive, "--torque",
     ]);
-    says(&message, &["no share, the logged torques are zero"]);
+    says(&message, &["no percentage, the logged torques are zero"]);
     let logs = ["--train", &passive, "--test", &passive];
     closed(
         &scratch,
@@ -215,7 +215,7 @@ fn what_the_logs_do_not_determine_has_no_end_in_the_report() {
     });
     closed(&scratch, &["--model", "pendulum", "--train", &log]);
     let report = fs::read_to_string(scratch.path("out/report.md")).unwrap();
-    says(&report, &["any value, as far as these logs tell"]);
+    says(&report, &["any value: these logs do not bound it"]);
     assert!(
         !report.contains("inf ") && !report.contains("NaN"),
         "{report}"
@@ -226,10 +226,10 @@ fn what_the_logs_do_not_determine_has_no_end_in_the_report() {
 fn formulas_that_are_no_finite_number_are_refused_with_their_place() {
     let scratch = Scratch::new();
     for (formula, message) in [
-        ("1e200 * 1e200 * q1", "this is inf, no finite number"),
+        ("1e200 * 1e200 * q1", "this is inf, not a finite number"),
         ("log(0) + q1", "this is -inf"),
         ("sqrt(1 - 2) * q1", "this is NaN"),
-        ("q1 / (1 - 1)", "this is divided by zero"),
+        ("q1 / (1 - 1)", "this divides by zero"),
     ] {
         let model = scratch.moving_by("model.toml", formula);
         says(
@@ -264,7 +264,7 @@ fn steps_of_any_length_are_exported_or_refused() {
     let message = String::from_utf8_lossy(&output.stdout);
     says(
         &message,
-        &["the model itself leaves the finite numbers in a step of 1e300 s from the state ["],
+        &["the model itself is not finite in a step of 1e300 s from the state ["],
     );
     for substeps in ["fine:1001", "fine:4294967295"] {
         let message = refuses(&[&usual[..], &["--integrator", substeps]].concat());
@@ -293,7 +293,7 @@ fn steps_of_any_length_are_exported_or_refused() {
 fn rigs_and_tasks_beyond_any_sensor_are_refused() {
     let scratch = Scratch::new();
     let out = scratch.out();
-    let beyond = "numbers up to 1e30 are taken";
+    let beyond = "numbers up to 1e30 are accepted";
     for (from, to) in [
         (
             "position = [[-3.141592653589793, 3.141592653589793]]",
@@ -428,7 +428,7 @@ fn plans_that_are_no_finite_numbers_end_a_run_of_learning() {
         let run = ["--config", &config, "--out", text(&out)];
         says(
             &ends_without(&[command, &run].concat()),
-            &["no candidate of the plan at 0.000 s has a finite return"],
+            &["no candidate plan at 0.000 s has a finite return"],
         );
     }
 }

@@ -1,4 +1,4 @@
-//! Every effect against its meaning, written by hand; exact sign.
+//! Every effect against a definition written by hand, with the exact sign.
 
 use rand::RngExt;
 use residyn::with_effects_in;

@@ -1,4 +1,4 @@
-//! Exported models, read by programs of their users.
+//! Exported models, read by their users' programs.
 
 use std::path::Path;
 
@@ -177,7 +177,7 @@ driven = 1
     let model = ExportModel::of_system(&system, Integrator::RK4, 0.01, Value::Null);
     for name in ["c", "fmu", "onnx", "python", "mjcf", "urdf"] {
         let limits = (find(name).unwrap().not_carried)(&model);
-        for piece in ["measured positions", "values of q_z1 that single logs have"] {
+        for piece in ["measured positions", "per-log values of q_z1"] {
             let said = limits.iter().any(|limit| limit.starts_with(piece));
             assert!(said, "{name}: {piece:?} is not in {limits:?}");
         }

@@ -1,4 +1,5 @@
-//! Flags belong to the command line: the library says what is wrong without them, and `src/cli` adds which flag mends it.
+//! Flags belong to the command line: the library says what is wrong without them, and `src/cli` adds which flag fixes
+//! it.
 
 use residyn::read_standard_log;
 use std::collections::BTreeSet;
@@ -77,13 +78,16 @@ fn the_command_line_says_which_flag_mends_an_error() {
     let message = refuses(&[&model[..], &["--test", &short]].concat());
     says(
         &message,
-        &["the test logs hold no window", "--test names the test logs"],
+        &[
+            "the test logs contain no window",
+            "--test names the test logs",
+        ],
     );
     let message = refuses(&[&model[..], &["--errors", "torque"]].concat());
     says(
         &message,
         &[
-            "no torques can be compared",
+            "torques cannot be compared",
             "--errors motion compares the motion",
         ],
     );

@@ -1,4 +1,4 @@
-//! Every command that works in a folder: alone, and only where there are room and permission, which it finds out before the work.
+//! Every command that works in a folder works there alone, and checks for space and permission before it starts.
 
 #![cfg(unix)]
 

@@ -1,4 +1,4 @@
-//! The example of the library's front page is the README's, too.
+//! The example on the library's front page is the README's, too.
 
 /// The lines of the example that readers see; `cargo test --doc` runs all of it.
 fn example() -> String {

@@ -1,4 +1,4 @@
-//! Every function that a formula may call: value and slopes, for every reader of programs.
+//! Every function that a formula may call: its value and slopes, in every reader of programs.
 
 use residyn_core::expr::{Graph, Program, Scope, SignForm, parse};
 use residyn_train::replay;

@@ -1,5 +1,5 @@
-//! Whole answers on fixed logs, beside those that are committed in `tests/golden`: a change that is meant to change no answer
-//! changes none of these.
+//! Whole answers on fixed logs, compared with those committed in `tests/golden`: a change that is not meant to change
+//! answers changes none of these.
 //!
 //! `tests/run --bless` rewrites them after an intended change; the difference is then part of the commit.
 

@@ -1,4 +1,4 @@
-//! Derivatives by every input of every model: ours against differences, f32 and Burn's own.
+//! Derivatives with respect to every input of every model: ours against differences, f32 and Burn's own.
 
 use burn::tensor::{Device, Tensor};
 use rand_chacha::ChaCha8Rng;

@@ -1,4 +1,4 @@
-//! Parameters of simulated rigs come back, with honest intervals.
+//! Fits recover the parameters of simulated rigs, with honest intervals.
 
 use rand::RngExt;
 use residyn_core::data::{Interval, Log};

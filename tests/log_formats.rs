@@ -1,4 +1,4 @@
-//! One trajectory in every format of logs, written by the libraries that people use.
+//! One trajectory in every log format, written by the libraries that people use.
 
 use std::fs;
 use std::path::Path;
@@ -21,7 +21,7 @@ fn files_that_are_not_read_get_the_line_that_converts_them() {
         (b"MATLAB 7.3 MAT-file", "h5py"),
         (b"MATLAB 5.0 MAT-file", "save('run.mat'"),
         (b"\x28\xb5\x2f\xfd", "zstd -d"),
-        (b"PAR1\x15\x04", "is no whole Parquet file"),
+        (b"PAR1\x15\x04", "is not a complete Parquet file"),
         (b"PK\x03\x04 and no more", "numpy.savez"),
     ];
     for (begin, remedy) in cases {
@@ -81,7 +81,7 @@ mod slow {
             ),
             (
                 "ragged.parquet",
-                "row 50 of \"q\" has 1 number(s) where the first has 2",
+                "row 50 of \"q\" has 1 number(s) but the first has 2",
             ),
             (
                 "pickled.npz",
@@ -124,7 +124,7 @@ mod slow {
         }
         for (name, wanted) in [
             ("set_v3", "holds several episodes, up to 1"),
-            ("set_v3", "set_v3#1 for instance"),
+            ("set_v3", "set_v3#1"),
             ("set_v2#7", "there is no episode 7"),
         ] {
             let said = read(name).unwrap_err();

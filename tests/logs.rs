@@ -1,5 +1,5 @@
-//! Logs as rigs write them: what is wrong with one is named, with what to paste to mend it, and what cannot be used is
-//! neither used nor passed over in silence.
+//! Logs as rigs write them: each fault is named, with the lines to paste to fix it, and unusable data are neither used
+//! nor silently skipped.
 
 use std::f64::consts::{PI, TAU};
 use std::fs;
@@ -367,7 +367,7 @@ fn a_push_by_hand_is_reported_with_its_range() {
         let pushes = audit
             .findings
             .iter()
-            .filter(|f| f.text.contains("further force"));
+            .filter(|f| f.text.contains("additional force"));
         pushes
             .map(|push| (push.spans_s[0], push.remedy.clone()))
             .collect::<Vec<_>>()

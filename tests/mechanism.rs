@@ -375,7 +375,7 @@ fn a_file_of_the_other_format_is_recognised() {
 #[test]
 fn angles_that_were_rounded_are_taken_as_written_and_noted() {
     let notes = chain("rounded_2r.urdf").notes;
-    let note = "line 23: `rpy`: 1.5708 is taken as written; if 1.5707963267948966 is meant, that makes shorter equations";
+    let note = "line 23: `rpy`: 1.5708 is taken as written; if 1.5707963267948966 is meant, writing it so makes shorter equations";
     assert!(notes.contains(&note.to_owned()), "{notes:?}");
     let contents = fs::read_to_string(fixture("rounded_2r.urdf")).unwrap();
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Effects with memory and those of the sensor: what they make of a torque or an angle, how sensitive motion is to them,
-//! and that they are found.
+//! Effects with memory and effects of the sensor: how they change a torque or an angle, how sensitive the motion is to
+//! them, and that they are found.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

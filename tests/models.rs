@@ -1,4 +1,4 @@
-//! One model of each kind that can be exported: equations, effects, filters of the command, networks; one joint and two.
+//! The exported models cover every kind: equations, effects, filters of the command, networks; one joint and two.
 
 use residyn_formats::ExportModel;
 

@@ -1,4 +1,4 @@
-//! Parameters that a file declares fixed, and that the rig has otherwise.
+//! Parameters that a file declares fixed although the rig has other values.
 
 use std::path::Path;
 

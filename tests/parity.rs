@@ -1,4 +1,4 @@
-//! One function, whoever reads the program: f64, f32, many lanes, Burn's tensors.
+//! All readers of a program compute the same function: f64, f32, many lanes, Burn's tensors.
 
 use burn::tensor::{Device, Tensor};
 use residyn_core::expr::{Program, SignForm};

@@ -1,4 +1,4 @@
-//! What differs from log to log: zeros of sensors are named, sized and not carried over to other logs.
+//! Values that differ from log to log: zeros of sensors are named, sized and not carried over to other logs.
 
 use std::path::{Path, PathBuf};
 

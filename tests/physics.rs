@@ -1,4 +1,4 @@
-//! Balances that every motion keeps, and the order of the integrator.
+//! Balances that every motion satisfies, and the order of the integrator.
 
 use std::path::Path;
 

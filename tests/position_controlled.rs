@@ -1,4 +1,4 @@
-//! Closing the loop where a controller prescribes the motion: by the torques that it needs.
+//! Closing the loop if a controller prescribes the motion: from the torques that the motion needs.
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -97,7 +97,7 @@ fn is_told(outcome: &Outcome, what: &str) -> bool {
 
 /// Whether an audit says that a log's torques imply another gravity.
 fn contradicts_gravity(outcome: &Outcome) -> bool {
-    is_told(outcome, "of the gravity that the declared bodies need")
+    is_told(outcome, "of the gravity torque of the declared bodies")
 }
 
 /// Rows of a log from one time on and before another.
@@ -287,7 +287,7 @@ mod slow {
         };
         assert!(is_told(
             &outcome,
-            "the motion is that of measurements_1.csv once more"
+            "the motion repeats that of measurements_1.csv"
         ));
         let message = report::text(&Report::new(&outcome, &Origin::of_seed(0)));
         assert!(message.contains("The motion of measurements_2.csv repeats that of another log"));

@@ -1,4 +1,4 @@
-//! What is printed says the same as the program.
+//! Printed equations mean the same as the program.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! The crates' interfaces beside the lists that are committed: what users call changes when that is meant, and not by chance.
+//! The crates' interfaces compared with the committed lists: what users call changes on purpose, not by chance.
 
 use crate::support::committed::is_as_committed;
 use crate::support::interface::interface;

@@ -1,4 +1,4 @@
-//! The recipes that are shipped, and what is said of bad ones.
+//! The shipped recipes, and the errors for bad ones.
 
 use residyn::read_model;
 use residyn::read_plant;

@@ -1,4 +1,4 @@
-//! Models that are scored as they are, beside those that are fitted.
+//! Models that are scored as they are, next to those that are fitted.
 
 use std::fs;
 use std::path::{Path, PathBuf};

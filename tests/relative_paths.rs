@@ -1,4 +1,4 @@
-//! Configurations that were copied to another folder, used from a third one: what they name is built in.
+//! Configurations copied to another folder and used from a third: what they name is built in.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! Runs and their files, through the binary: one run a folder, recorded commands that repeat the result, output files
-//! that are written through links and never onto devices.
+//! Runs and their files, through the binary: one run per folder, recorded commands that reproduce the result, output
+//! files that are written through links and never onto devices.
 
 use std::fs;
 use std::path::Path;

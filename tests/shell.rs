@@ -1,4 +1,4 @@
-//! What shells and manuals take from the definitions of the commands.
+//! Shell completions and manual pages from the definitions of the commands.
 
 use std::fs;
 use std::process::Command;

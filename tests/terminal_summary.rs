@@ -1,5 +1,5 @@
-//! What closing the loop prints in a terminal: the whole story in lines of eighty characters, thirty of them where there is not
-//! very much to say.
+//! What closing the loop prints in a terminal: the full answer in lines of eighty characters, thirty of them if there
+//! is not very much to say.
 
 use std::fs;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! One binary for all integration tests: Burn is linked once.
 //!
-//! A test that computes for more than a few seconds, needs other programs than a shell, or kills processes that it
+//! A test that computes for more than a few seconds, needs programs other than a shell, or kills processes that it
 //! starts belongs in a module called `slow`: in the folder of that name, or at the end of its subject's file.
 //! `tests/run --quick` skips these modules by their paths; a test elsewhere that needs another program fails there.
 

@@ -1,4 +1,4 @@
-//! `residyn train` and `residyn tune`, through the binary where its face matters.
+//! `residyn train` and `residyn tune`, through the binary if the command line matters.
 
 use std::ops::ControlFlow;
 use std::path::Path;

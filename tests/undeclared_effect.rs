@@ -1,4 +1,4 @@
-//! The loop closed on control: what an undeclared effect costs comes back.
+//! Closing the loop for control: it recovers what an undeclared effect costs.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -82,7 +82,7 @@ fn bad_experiments_are_refused_with_their_remedy() {
         (
             "episodes = [1]",
             "episodes = [3, 1]",
-            "rising numbers above zero",
+            "increasing numbers above zero",
         ),
         ("seeds = 1", "seeds = 0", "at least one each"),
         (

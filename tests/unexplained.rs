@@ -1,4 +1,4 @@
-//! What no effect of the library explains is told from noise, and where it lives.
+//! A residual that no effect of the library explains is distinguished from noise, and located.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! The walls between the crates: the table in docs/ARCHITECTURE.md is what their manifests say, and the core stays free of
-//! files, clocks, environment and processes.
+//! The boundaries between the crates: the table in docs/ARCHITECTURE.md agrees with their manifests, and the core stays
+//! free of files, clocks, environment and processes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,4 +1,4 @@
-//! A model's values in the robot description that it was made from.
+//! A model's values, written back into the robot description that it was made from.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -163,7 +163,7 @@ fn files_that_the_model_was_not_made_from_are_refused() {
     fs::write(&model, none.replace("positive = true", "positive = false")).unwrap();
     says(
         &fixture("spatial_3r.urdf"),
-        "no bodies have the model's values: the logs tell too little",
+        "no physical bodies have the model's values: the logs do not determine them",
     );
     let both = residyn(&[
         "export", "--model", "pendulum", "--format", "urdf", "--into", "a.urdf", "--out", "b.urdf",

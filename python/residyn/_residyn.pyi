@@ -34,9 +34,9 @@ __all__ = [
 ]
 
 class ResidynError(ValueError):
-    """What cannot be done: what is wrong, where (file, line, column), and what to do about it.
+    """An operation that cannot be done: what is wrong, where (file, line, column), and what to do about it.
 
-    A file that is missing or may not be opened is, as well, a FileNotFoundError or a PermissionError with its `filename`.
+    If a file is missing or may not be opened, it is also a FileNotFoundError or a PermissionError with its `filename`.
     """
 
 @final

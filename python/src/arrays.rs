@@ -1,4 +1,4 @@
-//! Channels `[joint][row]` as arrays of shape (rows, joints), and results as Python's own types.
+//! Channels `[joint][row]` as arrays of shape (rows, joints), and results as native Python types.
 
 use numpy::ndarray::{Array2, ArrayViewD, Axis};
 use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLikeDyn};

@@ -183,7 +183,7 @@ impl Question {
 /// See `residyn.close_loop`, which has the same arguments.
 #[pyfunction]
 #[pyo3(signature = (model, train, test, against, seed, budget_s, errors, network, progress))]
-#[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // the Python function's own
+#[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // as in the Python function
 pub fn close_loop(
     py: Python<'_>,
     model: &Model,
@@ -251,7 +251,7 @@ fn error_model(errors: &str) -> PyResult<ErrorModel> {
         "motion" => Ok(ErrorModel::OutputError),
         "torque" => Ok(ErrorModel::InverseDynamics),
         _ => Err(ResidynError::new_err(format!(
-            "errors = {errors:?}: give \"motion\", \"torque\", or None for those that say more about these logs"
+            "errors = {errors:?}: give \"motion\", \"torque\", or None to choose the more informative for these logs"
         ))),
     }
 }

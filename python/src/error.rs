@@ -11,8 +11,8 @@ pyo3::create_exception!(
     residyn,
     ResidynError,
     PyValueError,
-    "What cannot be done: what is wrong, where (file, line, column), and what to do about it.\n\n\
-     A file that is missing or may not be opened is, as well, a FileNotFoundError or a PermissionError with its `filename`."
+    "An operation that cannot be done: what is wrong, where (file, line, column), and what to do about it.\n\n\
+     If a file is missing or may not be opened, it is also a FileNotFoundError or a PermissionError with its `filename`."
 );
 
 /// Raises what the library says.

@@ -1,4 +1,4 @@
-//! The compiled half of the Python package: `residyn._residyn`, on which the modules in `python/residyn` stand.
+//! The compiled half of the Python package: `residyn._residyn`, on which the modules in `python/residyn` are built.
 
 mod arrays;
 mod close_loop;

@@ -14,7 +14,7 @@ use crate::model::Model;
 pub struct Library(pub Known);
 
 #[pymethods]
-#[allow(clippy::needless_pass_by_value)] // what Python gives is made into values of our own
+#[allow(clippy::needless_pass_by_value)] // arguments from Python become owned values
 impl Library {
     #[new]
     fn new() -> Self {

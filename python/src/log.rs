@@ -44,7 +44,7 @@ impl Log {
         let driven = match (tau, cmd) {
             (Some(_), Some(_)) => {
                 return Err(ResidynError::new_err(
-                    "give either tau or cmd: a log has what the model's drive is given",
+                    "give either tau or cmd: a log has the input of the model's drive",
                 ));
             }
             (Some(tau), None) => Some((Quantity::Torque, columns("tau", &tau)?)),
@@ -199,7 +199,7 @@ impl Log {
     fn leave_out(&self, start_s: f64, end_s: f64) -> PyResult<Self> {
         if !(start_s < end_s) {
             return Err(ResidynError::new_err(format!(
-                "{start_s} to {end_s} s is no stretch of time; give a start before the end"
+                "{start_s} to {end_s} s is not an interval of time; give a start before the end"
             )));
         }
         let mut log = self.0.clone();
@@ -229,7 +229,7 @@ impl Log {
     ///
     /// Raises:
     ///     ResidynError: a folder that cannot be written.
-    #[allow(clippy::needless_pass_by_value)] // what Python gives is made into a path of our own
+    #[allow(clippy::needless_pass_by_value)] // arguments from Python become owned values
     fn write(&self, path: PathBuf) -> PyResult<()> {
         write_log(&self.0, path).or_raise()
     }

@@ -89,7 +89,7 @@ fn warn(py: Python<'_>, notes: &[String]) -> PyResult<()> {
 }
 
 #[pymethods]
-#[allow(clippy::needless_pass_by_value)] // what Python gives is made into values of our own
+#[allow(clippy::needless_pass_by_value)] // arguments from Python become owned values
 impl Model {
     /// A model file, or a built-in system by its name.
     ///
@@ -472,7 +472,7 @@ impl Model {
         }
         if log.driven_by != model.driven_by() {
             return Err(ResidynError::new_err(format!(
-                "{} has `{}`, {} is driven by `{}`; give these, or a model whose [drive] says what becomes of commands",
+                "{} has `{}`, {} is driven by `{}`; give these, or a model whose [drive] turns commands into torques",
                 log.name(),
                 log.driven_by.key(),
                 model.name,

@@ -138,7 +138,7 @@ impl Rig {
         let (random, objective) = (&mut self.random, &self.objective);
         let moving = self.moving.as_mut();
         let moving = moving
-            .ok_or_else(|| ResidynError::new_err("the rig stands nowhere yet; call reset first"))?;
+            .ok_or_else(|| ResidynError::new_err("the rig has no state yet; call reset first"))?;
         moving.with_dependent_mut(|_, rig| {
             rig.step(&tau).or_raise()?;
             let reward = objective.value(rig.state(), &tau, rig.time_s());

@@ -1,4 +1,4 @@
-//! Long work, while Python goes on hearing signals.
+//! Runs long work while Python keeps handling signals.
 
 use std::ops::ControlFlow;
 use std::panic::resume_unwind;

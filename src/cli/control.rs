@@ -21,7 +21,7 @@ use residyn_io::files::write_whole;
 use residyn_io::read_model;
 use residyn_io::runs::RunFolder;
 use residyn_io::{read_plant, write_log};
-use residyn_report::{Film, film};
+use residyn_plot::{Film, film};
 use residyn_train::Checkpoint;
 
 /// Control a simulated plant by model-predictive control with any model

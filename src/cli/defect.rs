@@ -1,4 +1,4 @@
-//! A panic is a defect of the program, whatever the input was.
+//! Messages of panics: a panic is a defect of the program, whatever the input was.
 
 use std::fmt::Display;
 use std::panic::set_hook;

@@ -12,7 +12,8 @@ use residyn_core::model::Library;
 use residyn_experiments::experiment::undeclared_effect::{self, Trial};
 use residyn_experiments::experiment::{Config, Experiment, FinishedRound, Session, picture};
 use residyn_io::runs::{Part, RunFolder, Shard};
-use residyn_report::{ResultsPage, Share};
+use residyn_plot::Share;
+use residyn_report::ResultsPage;
 
 /// Experiments: return against real transitions, against the receding horizon, and with undeclared effects
 ///

@@ -1,4 +1,5 @@
-//! Ctrl-C: says what is kept and how to go on, and ends the program. Runs save as they go, so that they can end at any time.
+//! Ctrl-C: says what is kept and how to continue, and ends the program. Runs save as they go, so they can be ended at
+//! any time.
 
 use std::io::{self, IsTerminal};
 use std::process;

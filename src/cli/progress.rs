@@ -1,4 +1,4 @@
-//! How much of long work is done, on standard error: a bar on a terminal, elsewhere a line every ten seconds.
+//! Progress of long work, on standard error: a bar on a terminal, otherwise a line every ten seconds.
 
 use std::ops::Deref;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};

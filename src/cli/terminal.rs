@@ -1,5 +1,5 @@
-//! What the program says beside its answer, how much of the answer it prints, and its colours: on a terminal alone, and not where
-//! `NO_COLOR` is set.
+//! Messages besides the answer, how much of the answer is printed, and colours (only on a terminal, and not if
+//! `NO_COLOR` is set).
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};

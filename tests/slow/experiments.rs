@@ -1,4 +1,4 @@
-//! Two explanations that logs do not tell apart: the experiment that the report proposes does, where there is one.
+//! Two explanations that the logs cannot distinguish: the experiment that the report proposes does, if there is one.
 
 use std::path::{Path, PathBuf};
 
@@ -114,7 +114,7 @@ fn the_proposed_experiment_tells_what_the_logs_did_not() {
         "amplitude = [0]\nband_hz = [0.5, 0.6]\ntones = 1",
         &format!("[0, {speed}]"),
     );
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some seconds
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few seconds
     let logs = (numbers["seconds"].as_f64().unwrap() / 2.0).ceil() as u32;
     let more = record(&coasting, 0..logs, "2");
     let after = report("pendulum", &[train, more].concat(), &test);
@@ -165,7 +165,7 @@ fn what_is_the_same_in_the_equations_is_said_to_be() {
     let (alternative, again) = sled("", "1.2");
     let words = alternative["experiment"].as_str().unwrap();
     assert!(
-        words.starts_with("no change of torque, speed, load or duration"),
+        words.starts_with("no simulated change of torque, speed, load or duration"),
         "{words}"
     );
     assert_eq!(alternative["separation"]["seconds"], Value::Null);

@@ -1,4 +1,4 @@
-//! The compiled C header: its predictions, its Jacobians, and no warnings of any compiler.
+//! The compiled C header: its predictions, its Jacobians, and no warnings from any compiler.
 
 use std::fmt::Write as _;
 use std::io::Write as _;

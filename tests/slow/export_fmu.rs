@@ -1,4 +1,4 @@
-//! The FMU in FMPy: what it predicts, and that a simulator can do with it what the standard promises.
+//! The FMU in FMPy: its predictions, and that a simulator can do with it what the standard promises.
 
 use std::io::{Cursor, Read};
 use std::process::Command;

@@ -1,4 +1,4 @@
-//! The guide: its commands print what its pages say, and every link of the documents leads somewhere.
+//! The guide: its commands print what its pages say, and every link in the documents leads somewhere.
 
 use std::fs;
 use std::path::{Path, PathBuf};

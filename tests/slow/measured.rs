@@ -1,4 +1,4 @@
-//! Closing the loop on logs measured on real rigs. Where the data are is said in README.
+//! Closing the loop on logs measured on real rigs. README says where the data are.
 
 use serde_json::Value;
 

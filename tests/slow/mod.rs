@@ -1,4 +1,4 @@
-//! What `tests/run --quick` leaves out, in whole files.
+//! Whole files of tests that `tests/run --quick` leaves out.
 
 mod clients;
 mod experiments;

@@ -1,4 +1,4 @@
-//! The residual network on motion unlike that which it was trained on.
+//! The residual network on motion unlike its training data.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! What holds whatever is given: random formulas, models, reports and mechanisms survive being written and read, and what
-//! closing the loop finds does not depend on how a rig is written down.
+//! Properties that hold for any input: random formulas, models, reports and mechanisms survive being written and read,
+//! and what closing the loop finds does not depend on how a rig is described.
 
 use std::env;
 

@@ -1,4 +1,4 @@
-//! Recordings of robots, rosbag2 and MCAP, written by the libraries that people use.
+//! Robot recordings, rosbag2 and MCAP, written by the libraries that people use.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -97,7 +97,7 @@ fn a_recording_that_is_cut_off_is_read_up_to_there() {
     let log = read(&folder.join("cut.mcap"), &rig()).unwrap();
     assert!((2..40).contains(&log.rows()), "{}", log.rows());
     assert_eq!(log.q[1], wanted.q[1][..log.rows()]);
-    assert!(log.notes[0].ends_with("cut.mcap is cut off: what came before the cut is read"));
+    assert!(log.notes[0].ends_with("cut.mcap is cut off: only the part before the cut is read"));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Effects that no log shows alone: each speed and each angle has all of them at once.
+//! Effects that no log shows alone: all of them act at each speed and each angle.
 
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! Runs that are done in shards: put together they are those of one machine.
+//! Runs in shards: merged, they equal the run of one machine.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,5 @@
-//! `scripts/slurm` on Slurm's own daemons, started here on one node: whatever is killed, the results are those of one machine.
+//! `scripts/slurm` on Slurm's own daemons, started here on one node: whatever is killed, the results are those of one
+//! machine.
 
 #![cfg(unix)]
 

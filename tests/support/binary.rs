@@ -1,4 +1,4 @@
-//! The real binary, and what it says.
+//! The real binary and its output.
 
 use std::path::Path;
 use std::process::{Child, Command, Output};

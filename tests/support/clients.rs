@@ -1,4 +1,4 @@
-//! Other programs that read what Residyn writes. A test without its program says so loudly, and passes.
+//! Other programs that read what Residyn writes. A test whose program is missing says so loudly, and passes.
 
 use std::io::Write;
 use std::path::Path;

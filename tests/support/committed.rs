@@ -1,4 +1,4 @@
-//! Texts that are committed, and made anew by `tests/run --bless`.
+//! Committed texts, which `tests/run --bless` rewrites.
 
 use std::env;
 use std::fs;

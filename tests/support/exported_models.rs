@@ -1,4 +1,5 @@
-//! One model of each kind that can be exported: equations, effects, filters of the command, networks; one joint and two.
+//! One model of each kind that can be exported: equations, effects, filters of the command, networks; one joint and
+//! two.
 
 use std::path::Path;
 use std::sync::OnceLock;

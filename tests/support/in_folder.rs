@@ -1,4 +1,4 @@
-//! The real binary with a working folder of its own.
+//! The real binary in its own working folder.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};

@@ -1,4 +1,4 @@
-//! The public items of a crate as its sources declare them. No stable tool lists them: rustdoc's JSON is for nightly.
+//! The public items of a crate as its sources declare them. No stable tool lists them: rustdoc's JSON needs nightly.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,4 +1,4 @@
-//! One trajectory in every format of logs and recordings, written by the libraries that people use.
+//! One trajectory in every format of log and recording, written by the libraries that people use.
 
 use std::fs;
 use std::path::Path;

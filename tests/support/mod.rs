@@ -1,4 +1,4 @@
-//! What tests share, a file a subject. Tests import from here, never from each other.
+//! Code that tests share, one file per subject. Tests import from here, never from each other.
 
 pub mod arms;
 pub mod bench;

@@ -1,4 +1,4 @@
-//! What clients of exported models predict, beside the program's own predictions.
+//! What clients of exported models predict, compared with the program's own predictions.
 
 use std::io::Write;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! Folders of runs, compared.
+//! Compares the folders of runs.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -69,13 +69,13 @@ impl Condition {
             && !self.drive.is_empty()
             && self.logs >= 2
             && self.seconds * self.rate_hz >= 10.0;
-        let needs = "needs a `loop`, `rate_hz` above zero, `noise` and `quantum` not below, two logs, ten rows";
+        let needs = "needs a `loop`, `rate_hz` above zero, `noise` and `quantum` not negative, at least two logs and ten rows";
         if !sound {
             return Err(needs.to_owned());
         }
         check_rows(self.rate_hz, &[self.seconds])?;
         if self.logs > RUNS {
-            return Err(format!("`logs` is at most {RUNS}, found {}", self.logs));
+            return Err(format!("at most {RUNS} `logs`, found {}", self.logs));
         }
         check_readings("noise and quantum", [self.noise, self.quantum])?;
         self.flaws.check()
@@ -91,7 +91,7 @@ pub(super) fn check_rows(rate_hz: f64, seconds: &[f64]) -> Result<(), String> {
     match seconds.iter().find(|seconds| !fits(seconds)) {
         None => Ok(()),
         Some(seconds) => Err(format!(
-            "a log is at most {SIMULATED_S:e} s long and has at most {LOG_ROWS} rows, {rate_hz:?} Hz for {seconds:?} s are more"
+            "a log is at most {SIMULATED_S:e} s long and has at most {LOG_ROWS} rows; {rate_hz:?} Hz for {seconds:?} s is more"
         )),
     }
 }

@@ -1,4 +1,4 @@
-//! Whether intervals hold the truth.
+//! Whether intervals contain the true values.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};

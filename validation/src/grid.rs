@@ -222,7 +222,7 @@ impl File {
             ];
             if lists.iter().any(|list| list.len() != joints) {
                 return Err(format!(
-                    "plants.{name}: every list of `driving` has {joints} numbers, one a joint"
+                    "plants.{name}: every list of `driving` must have {joints} numbers, one per joint"
                 ));
             }
             check_readings("driving", lists.into_iter().flatten().copied())
@@ -230,7 +230,7 @@ impl File {
             let rises = |[low, high]: [f64; 2]| 0.0 < low && low < high;
             if !(rises(driving.torque_hz) && rises(driving.reference_hz)) {
                 return Err(format!(
-                    "plants.{name}: `torque_hz` and `reference_hz` are two rising frequencies above zero"
+                    "plants.{name}: `torque_hz` and `reference_hz` must be two increasing frequencies above zero"
                 ));
             }
         }
@@ -460,7 +460,7 @@ mod tests {
         );
         assert_eq!(
             wrong("joint = 1, F_c", "joint = 2, F_c"),
-            "grid.toml: series 1: `coulomb_friction`: `joint` is from 1 to 1"
+            "grid.toml: series 1: `coulomb_friction`: `joint` must be from 1 to 1"
         );
         assert_eq!(
             wrong(r#"conditions = ["base"]"#, r#"conditions = ["fast"]"#),
@@ -470,9 +470,11 @@ mod tests {
             wrong("seeds = [1, 2]", "seeds = [1, 1]"),
             "grid.toml: the cell p/coulomb_friction@1(F_c=0.1)/base/1 occurs twice"
         );
-        assert!(wrong("torque = [1.0]", "torque = [1.0, 2.0]").contains("1 numbers, one a joint"));
+        assert!(
+            wrong("torque = [1.0]", "torque = [1.0, 2.0]").contains("1 numbers, one per joint")
+        );
         assert!(wrong("seconds = 20", "seconds = 1e9").contains("at most 1e5 s long"));
-        assert!(wrong("logs = 4", "logs = 1000000000").contains("`logs` is at most 100000"));
+        assert!(wrong("logs = 4", "logs = 1000000000").contains("at most 100000 `logs`"));
         assert!(wrong("logs = 4", "logs = 1").contains("conditions.base: needs"));
     }
 

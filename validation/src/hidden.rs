@@ -135,7 +135,7 @@ impl Machine {
         let joints = self.joints();
         if !hidden.joint.is_of(joints) {
             let name = &hidden.name;
-            return Err(format!("`{name}`: `joint` is from 1 to {joints}"));
+            return Err(format!("`{name}`: `joint` must be from 1 to {joints}"));
         }
         if hidden.name == "parameter_shift" {
             return self.shift(hidden);
@@ -180,7 +180,7 @@ impl Machine {
             "encoder_eccentricity" => self.eccentricity[j] = [n("e_s")?, n("e_c")?],
             // A property of the sensor, not of the machine: each log draws its own.
             "sensor_offset" => drop(n("q_z")?),
-            name => return Err(format!("`{name}` is no effect of joint {}", hidden.joint)),
+            name => return Err(format!("`{name}` cannot act on joint {}", hidden.joint)),
         }
         Ok(())
     }

@@ -94,7 +94,7 @@ impl Machine {
         let mut sources: Vec<Source> = (0..joints)
             .map(|j| Source::draw(driving, how, &effort, j, rng))
             .collect();
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some thousands
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand
         let rows = (condition.seconds * condition.rate_hz).round() as usize + 1;
         let mut clock = Clock::new(condition.rate_hz, flaws);
         let mut losses = Losses::new(flaws);

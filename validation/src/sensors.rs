@@ -1,4 +1,4 @@
-//! What is logged of a rig: encoders, torque sensor, clock, and rows that are lost on the way.
+//! What is logged of a rig: encoders, torque sensor, clock, and lost rows.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -39,8 +39,7 @@ impl Flaws {
         let sound = sizes.iter().all(|size| *size >= 0.0)
             && (0.0..0.5).contains(&self.dropped)
             && (self.dropped == 0.0 || self.burst > 0);
-        let needs =
-            "`flaws` needs numbers not below zero, `dropped` below a half, and `burst` with it";
+        let needs = "`flaws` needs numbers that are not negative, `dropped` below a half, and `burst` with it";
         if sound { Ok(()) } else { Err(needs.to_owned()) }
     }
 

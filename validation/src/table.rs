@@ -10,7 +10,7 @@ use super::grid::{Cell, Group};
 use super::rows::{Done, Rate, Row, rows};
 use residyn_core::closeloop::Verdict;
 use residyn_core::data::statistics::rank_quantile;
-use residyn_report::Share;
+use residyn_plot::Share;
 
 /// One cell and its result; one line of `cells.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

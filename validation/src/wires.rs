@@ -1,4 +1,4 @@
-//! The way of commands to the drives: when each was issued, and when a drive's delay lets it arrive.
+//! The path of commands to the drives: when each was issued, and when a drive's delay lets it arrive.
 
 use super::drive::Approach;
 use super::machine::Machine;

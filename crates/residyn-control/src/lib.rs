@@ -1,4 +1,4 @@
-//! Planning with a model, and control by it: planners, tasks, episodes.
+//! Planning and control with a model: planners, tasks, episodes.
 
 pub mod control;
 pub mod plan;

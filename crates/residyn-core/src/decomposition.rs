@@ -1,4 +1,4 @@
-//! Decompositions of matrices that come to an end: nalgebra's own go on for ever over numbers that are not finite.
+//! Matrix decompositions that always end: nalgebra's never do if a number is not finite.
 
 use nalgebra::allocator::Allocator;
 use nalgebra::{

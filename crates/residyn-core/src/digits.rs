@@ -1,4 +1,4 @@
-//! Numbers with as many digits as are known of them.
+//! Numbers rounded to the digits that are known.
 
 use crate::model::Parameter;
 
@@ -40,7 +40,7 @@ pub fn amount_of(value: f64, ci95: Option<[f64; 2]>, unit: &str) -> String {
         (Some([low, high]), true, true) => format!("{low} to {high}"),
         (Some([low, _]), true, false) => format!("{low} or more"),
         (Some([_, high]), false, true) => format!("{high} or less"),
-        (Some(_), false, false) => "any value, as far as these logs tell".to_owned(),
+        (Some(_), false, false) => "any value: these logs do not bound it".to_owned(),
     };
     format!("{} ({interval})", with_unit(value, unit))
 }

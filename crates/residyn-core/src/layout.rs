@@ -1,4 +1,4 @@
-//! Text in lines for a terminal.
+//! Text wrapped into lines for a terminal.
 
 /// Where the text next to a label begins \[characters\].
 pub(crate) const LABEL: usize = 9;

@@ -2,9 +2,9 @@
 //! effect behind it.
 //!
 //! Arrays and texts go in, values come out: no file is opened here, no clock read, no process started, and random
-//! numbers are an argument. The caller follows or ends long work through a [`closeloop::Watch`].
+//! numbers are an argument. The caller monitors or stops long work through a [`closeloop::Watch`].
 //!
-//! Models and effects are made from text, logs from what a program has recorded.
+//! Models and effects are made from text, logs from arrays that a program has recorded.
 //!
 //! ```
 //! use residyn_core::closeloop::Request;
@@ -43,7 +43,7 @@
 //! .log("spin-up")?;
 //! let predicted = traces(&model.dynamics(), &log, 0.5);
 //! let mut request = Request::of(&model, &library, vec![log]); // for `close_loop`
-//! request.settings.split.test_share = 0.5; // it divides the logs when the loop is closed
+//! request.settings.split.test_share = 0.5; // the share of logs that it sets apart
 //! # assert!(predicted.iter().all(|trace| (trace.q[0][10] - trace.q[0][0]).abs() < 0.3));
 //! # assert!(predicted.len() > 5);
 //! # Ok(())

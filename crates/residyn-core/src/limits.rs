@@ -1,4 +1,4 @@
-//! What is taken at most of what a user gives: depths, sizes and counts. An error about one of them names its number.
+//! Limits on what a user gives: depths, sizes and counts. An error about a limit names its number.
 
 /// Nested parentheses, calls, signs and powers in a formula.
 pub const FORMULA_NESTING: usize = 200;
@@ -95,7 +95,7 @@ pub fn check_readings(name: &str, numbers: impl IntoIterator<Item = f64>) -> Res
     let mut numbers = numbers.into_iter();
     match numbers.find(|number| !is_reading(*number)) {
         Some(number) => Err(format!(
-            "`{name}` has {number:e}; numbers up to {READING:e} are taken"
+            "`{name}` has {number:e}; only numbers up to {READING:e} are accepted"
         )),
         None => Ok(()),
     }
@@ -104,7 +104,7 @@ pub fn check_readings(name: &str, numbers: impl IntoIterator<Item = f64>) -> Res
 /// The message for a file that holds more than that.
 pub fn too_large() -> String {
     format!(
-        "it holds more than {} MB and {UNPACKED_RATIO} times its size when it is unpacked; unpack it first",
+        "unpacked, it holds more than {} MB and {UNPACKED_RATIO} times its size; unpack it first",
         UNPACKED_BYTES >> 20
     )
 }

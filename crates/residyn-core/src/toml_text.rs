@@ -1,4 +1,4 @@
-//! Texts in TOML: what is read of them at most, and that their numbers are finite.
+//! TOML texts: limits on their size, and the check that their numbers are finite.
 
 use serde::de::{DeserializeOwned, Error as _};
 use toml::Spanned;
@@ -17,14 +17,13 @@ pub fn check_size(text: &str) -> Result<(), (usize, String)> {
     let parts = text.bytes().filter(|byte| b",=[{.\n".contains(byte));
     if parts.count() > TOML_PARTS {
         let message = format!(
-            "it has more than {TOML_PARTS} values, keys, tables and lines; take out what is not needed"
+            "it has more than {TOML_PARTS} values, keys, tables and lines; remove those that are not needed"
         );
         return Err((0, message));
     }
     let message = |at| {
-        let message = format!(
-            "more than {TOML_NESTING} arrays and tables are within each other; take them apart"
-        );
+        let message =
+            format!("arrays and tables are nested more than {TOML_NESTING} deep; flatten them");
         (at, message)
     };
     too_deep(text).map(message).map_or(Ok(()), Err)
@@ -67,7 +66,7 @@ pub fn from_toml<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
         None => Ok(said),
         Some(number) => {
             let span = number.span();
-            let message = format!("{} is no finite number; write one", &text[span.clone()]);
+            let message = format!("{} is not a finite number; write one", &text[span.clone()]);
             Err(refused(span.start, &message))
         }
     }
@@ -108,7 +107,7 @@ mod tests {
         for part in ["[", "{[c]\nd={", "{a=[}],b=", "{a={]},b="] {
             let message = from_toml::<toml::Table>(&deep(part)).unwrap_err();
             assert!(
-                message.to_string().contains("more than 80 arrays"),
+                message.to_string().contains("more than 80 deep"),
                 "{message}"
             );
         }
@@ -125,7 +124,7 @@ mod tests {
         for number in ["nan", "-inf"] {
             let message = read(&format!("a = 1\n[b]\nc = [1.0, {{ d = {number} }}]"));
             let message = message.unwrap_err().to_string();
-            let expected = format!("line 3: {number} is no finite number; write one");
+            let expected = format!("line 3: {number} is not a finite number; write one");
             assert_eq!(message.trim(), expected);
         }
     }

@@ -231,12 +231,12 @@ impl ExportModel {
     /// Sensor properties that no format carries: measured positions that differ from the joint's.
     pub(super) fn sensors_not_carried(&self) -> Vec<String> {
         let shown = self.equations.reading.as_ref().map(|_| {
-            "measured positions: they are the rig's own, without the play of the sensors".to_owned()
+            "measured positions: they are the rig's true ones, without sensor play".to_owned()
         });
         let parameters = self.equations.parameters.iter().filter(|p| p.per_log);
         let own = parameters.map(|p| {
             let Parameter { name, value, .. } = p;
-            format!("values of {name} that single logs have of their own: it is {value} for all")
+            format!("per-log values of {name}: {value} is written for all logs")
         });
         shown.into_iter().chain(own).collect()
     }

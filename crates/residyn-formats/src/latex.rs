@@ -1,4 +1,4 @@
-//! LaTeX: the equations with fitted values and intervals, as a document of its own.
+//! LaTeX: the equations with fitted values and intervals, as a standalone document.
 
 use std::fmt::Write;
 use std::path::Path;

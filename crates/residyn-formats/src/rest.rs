@@ -1,4 +1,4 @@
-//! How short the steps of a model have to be around rest, where dry friction is steepest.
+//! How short a model's steps must be near rest, where dry friction is steepest.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Text with places to be filled, marked `@SO@`.
+//! Text templates with placeholders, marked `@LIKE_THIS@`.
 
 use std::fmt::{Display, Write};
 

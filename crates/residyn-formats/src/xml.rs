@@ -1,4 +1,4 @@
-//! XML whose every error names file, line and column.
+//! Reads XML; every error names file, line and column.
 
 mod crowd;
 

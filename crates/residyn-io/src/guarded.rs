@@ -1,4 +1,4 @@
-//! Calls of crates that take a damaged file for granted, and panic.
+//! Guards calls to crates that panic on damaged files.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};

@@ -1,4 +1,4 @@
-//! Logs, models, plants and runs as files. Everything that opens one is here or in the binary; what they mean is in
+//! Logs, models, plants and runs as files. All code that opens files is here or in the binary; their meaning is in
 //! `residyn-core`.
 
 pub mod files;

@@ -220,7 +220,7 @@ mod tests {
         let error = message("time,q1,qd1,tau1\n0.5,0,0,0\n0.5,0,0,0\n");
         assert!(
             error.starts_with(
-                "rig.csv, line 3, column \"time\": time 0.5 s does not come after 0.5 s of line 2"
+                "rig.csv, line 3, column \"time\": time 0.5 s does not come after 0.5 s in line 2"
             ),
             "{error}"
         );

@@ -1,4 +1,4 @@
-//! What the logs tell of the bodies of a chain.
+//! What the logs determine about the bodies of a chain.
 
 use std::fmt::Write;
 

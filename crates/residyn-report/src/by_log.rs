@@ -1,4 +1,4 @@
-//! The values of single logs, and what they say of the spread of a rig's values, as parts of `report.json`.
+//! The values of single logs, and the spread of a rig's values that follows from them, as parts of `report.json`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

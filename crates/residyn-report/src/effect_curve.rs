@@ -1,15 +1,15 @@
-//! What the effects add by their formulas, over the one variable that they depend on, with 95 % bands.
+//! The force that the effects' formulas add, over the one variable that they depend on, with 95 % bands.
 
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::plot::decimate::bends;
 use residyn_core::closeloop::Outcome;
 use residyn_core::data::Joint;
 use residyn_core::expr::Program;
 use residyn_core::model::FittedEffect;
+use residyn_plot::bends;
 
 /// force of the effects added on a joint that depend on this variable alone; linear between the points
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
@@ -70,7 +70,7 @@ fn curve(
     terms: &[Term<'_>],
     [low, high]: [f64; 2],
 ) -> EffectCurveEntry {
-    #[allow(clippy::cast_precision_loss)] // a thousand
+    #[allow(clippy::cast_precision_loss)] // a thousand points
     let at = |k: usize| low + (high - low) * k as f64 / (FINE - 1) as f64;
     let x: Vec<f64> = (0..FINE).map(at).collect();
     let forces: Vec<[f64; 2]> = x.iter().map(|x| force(outcome, terms, *x)).collect();

@@ -5,7 +5,6 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::json::{CHECKPOINT, MODEL, PAGE, PLOTS, RANGES, REPORT, TEXT};
-use super::plot::PlotError;
 use super::schema::Report;
 use super::{model_file, page, picture, text};
 use residyn_core::closeloop::{Outcome, Stage};
@@ -13,6 +12,7 @@ use residyn_core::model::Origin;
 use residyn_io::files::{
     FreshFolder, OutputError, end_of_links, folder_of, move_contents, read_saved, write_whole,
 };
+use residyn_plot::PlotError;
 
 /// Why results could not be written.
 #[derive(Debug, Error)]

@@ -1,4 +1,4 @@
-//! The answer in a sentence, and joints as people call them.
+//! The answer in one sentence, and the names of joints as people use them.
 
 use super::wording::listed;
 use residyn_core::closeloop::{Outcome, Verdict};

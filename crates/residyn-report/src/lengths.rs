@@ -1,4 +1,4 @@
-//! Whether the lists of a report that was read are as long as the others say: what makes pages of it takes that for granted.
+//! Whether the lists of a report read from a file have matching lengths, which the code that makes pages assumes.
 
 use super::motion::MotionEntry;
 use super::schema::{ErrorEntry, ModelError, Report};

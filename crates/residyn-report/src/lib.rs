@@ -1,4 +1,4 @@
-//! What closing the loop found, for people and for programs.
+//! Reports of what closing the loop found, for people and for programs.
 
 mod accuracy;
 mod bodies;
@@ -6,7 +6,6 @@ mod by_log;
 mod calibration;
 mod diagnostics;
 mod effect_curve;
-mod film;
 mod folder;
 mod headline;
 mod json;
@@ -15,7 +14,6 @@ mod model_file;
 mod motion;
 mod page;
 mod picture;
-pub mod plot;
 mod plot_data;
 mod schema;
 mod summary;
@@ -23,10 +21,9 @@ mod tensorboard;
 mod text;
 mod wording;
 
-pub use film::{Film, film};
 pub use folder::{ReadError, WriteError, write};
 pub use model_file::model_file;
-pub use page::{ResultsPage, Share, page};
+pub use page::{ResultsPage, page};
 pub use schema::{Report, schema};
 pub use summary::{Words, answer, curves, summary};
 pub use tensorboard::EventFile;

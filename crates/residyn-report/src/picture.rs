@@ -1,15 +1,15 @@
-//! The report's plots: what of an outcome goes into which chart.
+//! The report's plots: which parts of an outcome go into which chart.
 
 use super::headline::label;
-use super::plot::{
-    Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapeModel, ShapePanel,
-    ShapeSample, Track,
-};
 use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
 use residyn_core::closeloop::{ErrorModel, ForceSample, Needed, Outcome, ResidualForce};
 use residyn_core::data::{Joint, Log};
 use residyn_core::identify::FitError;
 use residyn_core::sim::metric::{Assessment, NeededTorques, Trace, summarise};
+use residyn_plot::{
+    Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapeModel, ShapePanel,
+    ShapeSample, Track,
+};
 
 /// A picture shows this much of a log in s: more than that and predictions become a blur.
 const SHOWN_S: f64 = 8.0;
@@ -57,7 +57,7 @@ fn motion(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
         "{}: predictions of {horizon} s, each started from the log",
         log.name()
     );
-    super::plot::predictions(&panels, &title)
+    residyn_plot::predictions(&panels, &title)
 }
 
 /// Logged torques and those that the motion needs according to the models, both low-passed.
@@ -90,7 +90,7 @@ fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
     let joints = outcome.models.after.model.joints;
     let panels: Vec<Panel> = Joint::all(joints).map(panel).collect();
     let title = format!("{}: torques that its motion needs", log.name());
-    super::plot::predictions(&panels, &title)
+    residyn_plot::predictions(&panels, &title)
 }
 
 fn kind(outcome: &Outcome, joint: Joint) -> JointKind {
@@ -137,7 +137,7 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
     let panels: Vec<ShapePanel> = Joint::all(outcome.models.after.model.joints)
         .map(panel)
         .collect();
-    super::plot::residual_shape(
+    residyn_plot::residual_shape(
         &panels,
         "Residual force: what each model leaves unexplained",
     )
@@ -207,5 +207,5 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
         .flat_map(|joint| (0..errors.before.horizons.len()).map(move |h| (joint, h)))
         .map(|(joint, h)| row(joint, h))
         .collect();
-    super::plot::error_bars(&rows, "Open-loop position error on the test logs")
+    residyn_plot::error_bars(&rows, "Open-loop position error on the test logs")
 }

@@ -1,5 +1,5 @@
-//! What a page draws of an outcome: measured beside predicted, and the residual force. Thinned and rounded, as a part of
-//! `report.json`, so that the page can be made from that file alone.
+//! The data of an outcome that a page draws: measured and predicted curves, and the residual force. Thinned and
+//! rounded, as a part of `report.json`, so that the page can be made from that file alone.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -147,7 +147,7 @@ fn torques(outcome: &Outcome) -> Vec<Series<'_>> {
     let series = tests.filter_map(|(log, needed)| {
         let (before, after) = (needed.before.as_ref()?, needed.after.as_ref()?);
         let start_s = before.time.first()?;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // time since the start
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // not negative
         let window = |t: &f64| ((t - start_s) / STRETCH_S) as usize;
         Some(Series {
             log,
@@ -220,13 +220,13 @@ fn error(one: &Series<'_>, rows: &Rows) -> f64 {
         let squares: f64 = pairs.map(|(m, p)| (m - p).powi(2)).sum();
         squares / variance(measured).max(f64::MIN_POSITIVE)
     };
-    #[allow(clippy::cast_precision_loss)] // some hundreds
+    #[allow(clippy::cast_precision_loss)] // a few hundred
     let count = rows.len() as f64;
     let all: f64 = one.measured.iter().zip(&one.models[1]).map(of_joint).sum();
     (all / count).sqrt()
 }
 
-#[allow(clippy::cast_precision_loss)] // many rows
+#[allow(clippy::cast_precision_loss)] // rows are far fewer than 2^52
 pub(super) fn variance(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;

@@ -1,4 +1,4 @@
-//! Event files, as TensorBoard and its kin read them: records of protocol buffers with checksums.
+//! Event files, as TensorBoard and similar tools read them: records of protocol buffers with checksums.
 
 use std::fs::File;
 use std::io::Write;

@@ -25,7 +25,7 @@ pub enum SegmentsError {
         row: usize,
         value: f64,
     },
-    #[error("time goes from {before} s to {after} s at row {row}; it must grow")]
+    #[error("time goes from {before} s to {after} s at row {row}; it must increase")]
     Time { row: usize, before: f64, after: f64 },
     #[error(
         "a trajectory of {rows} rows has no segment of {steps} steps; give longer logs or lower the number of steps"
@@ -61,16 +61,18 @@ pub enum TrainError {
     #[error("setting `{name}` is {value}; it must be finite and not negative")]
     Setting { name: &'static str, value: f64 },
     #[error(
-        "setting `weight_decay` is above 0, and {0:?} has no decoupled weight decay; take adam, adan, lamb or lion"
+        "setting `weight_decay` is above 0, and {0:?} has no decoupled weight decay; use adam, adan, lamb or lion"
     )]
     Decay(OptimizerKind),
-    #[error("setting `anneal` is {0}; it is a share of the learning rates, above 0 and at most 1")]
+    #[error(
+        "setting `anneal` is {0}; it must be a share of the learning rates, above 0 and at most 1"
+    )]
     Anneal(f64),
     #[error("setting `epochs` is {0}; at most {EPOCHS} are trained")]
     Epochs(usize),
     #[error(
         "the loss became {loss} in epoch {epoch}, with {parameters}; look for outliers or wrong units \
-         in the data, lower the learning rates, or take shorter segments or a finer integrator"
+         in the data, lower the learning rates, or use shorter segments or a finer integrator"
     )]
     Diverged {
         epoch: usize,
@@ -95,8 +97,8 @@ pub enum CheckpointError {
         dir: PathBuf,
     },
     #[error(
-        "the checkpoint is of another model: its {what} is {saved}, the model's is {given}; use the \
-         model file saved beside it (model.toml), in {dir:?}"
+        "the checkpoint is of another model: its {what} is {saved}, the model's is {given}; use the model file saved \
+         with it (model.toml), in {dir:?}"
     )]
     Foreign {
         what: &'static str,

@@ -1,4 +1,4 @@
-//! What an optimiser remembers, as Burn's records have it (`optimizer.bpk`).
+//! The state of an optimiser, as a Burn record (`optimizer.bpk`).
 
 use std::collections::HashMap;
 

@@ -290,7 +290,7 @@ mod tests {
         );
         assert_eq!(
             refused(&mut segments, &[0.0, 0.0], &[0.0; 4]),
-            "time goes from 0 s to 0 s at row 1; it must grow"
+            "time goes from 0 s to 0 s at row 1; it must increase"
         );
         assert_eq!(
             refused(&mut segments, &[0.0, 0.1], &[0.0; 3]),

@@ -1,4 +1,4 @@
-//! `--calibrate`: what is found in each simulation is kept, so that a calibration that was interrupted goes on.
+//! `--calibrate`: the findings of each simulation are saved, so that an interrupted calibration can go on.
 
 use std::collections::BTreeMap;
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! Inputs that are nearly files: seeds after some edits.
+//! Inputs that are nearly valid files: seeds with a few edits.
 
 use std::ops::Range;
 

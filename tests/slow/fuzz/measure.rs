@@ -1,4 +1,4 @@
-//! What a reader takes for one input, and whether it is too much.
+//! The time and memory that a reader takes for one input, and whether they are too much.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -1,7 +1,8 @@
 //! Every reader on damaged and on hostile files: each is read or refused, in little time and memory, without a panic.
 //!
 //! An input is identified by its target and its number, which seeds its random numbers. `RESIDYN_FUZZ=N` runs the first
-//! N inputs of each target instead of the usual ones, `RESIDYN_FUZZ=A..B` those from A on: see docs/robustness.md.
+//! N inputs of each target instead of the usual ones, `RESIDYN_FUZZ=A..B` those from A to before B: see
+//! docs/robustness.md.
 
 mod edits;
 mod measure;

@@ -1,4 +1,4 @@
-//! Inputs within containers: what is inside is edited, and lengths and checksums around it are made right.
+//! Inputs within containers: the contents are edited, and the lengths and checksums around them are corrected.
 
 use std::fs;
 use std::io::{Cursor, Write};

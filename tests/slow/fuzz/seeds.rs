@@ -1,4 +1,4 @@
-//! Files as they should be, of every format: our own, those that the program writes, and those of other libraries.
+//! Valid files of every format: our own, those that the program writes, and those of other libraries.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! The readers, each with its seeds and with the use that is made of what it accepts.
+//! The readers, each with its seeds and with the use made of what it accepts.
 
 use std::fs;
 use std::path::{Path, PathBuf};

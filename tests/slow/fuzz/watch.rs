@@ -1,4 +1,4 @@
-//! Inputs that never end: the thread that reads one cannot tell.
+//! Watches for inputs whose reading never ends, which the reading thread cannot notice.
 
 use std::sync::{Arc, Mutex};
 use std::thread;

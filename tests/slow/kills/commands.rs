@@ -1,4 +1,4 @@
-//! The commands that take long, in settings of a second or less.
+//! The long-running commands, with settings for a second or less.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Runs that signals and failing calls befall.
+//! Runs disturbed by signals and failing calls.
 
 use std::fs;
 use std::os::unix::process::ExitStatusExt;

@@ -1,5 +1,6 @@
-//! Long commands that are killed, that find the disk full and whose writes come short, at instants drawn at random, half of them
-//! the very changes of files. What they leave is whole, and the same command then ends with the bytes of an undisturbed run.
+//! Long commands that are killed, find the disk full or have their writes cut short, at random instants, half of them
+//! exactly when files change. The files that they leave are whole, and the same command then ends with the bytes of an
+//! undisturbed run.
 //!
 //! `RESIDYN_KILLS` is the number of disturbances per command, 4 if it is not set. `--nocapture` shows the table of
 //! docs/robustness.md.

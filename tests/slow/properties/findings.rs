@@ -1,4 +1,4 @@
-//! What closing the loop finds of a rig does not depend on how the rig is written down: units, the order of columns, logs and
+//! What closing the loop finds does not depend on how the rig is described: units, the order of columns, logs and
 //! joints, and when its clock was set to zero.
 
 use std::fmt::Write as _;

@@ -1,4 +1,4 @@
-//! Formulas: printed and parsed, derived.
+//! Formulas: printed and parsed, differentiated.
 
 use proptest::num::f64::{NEGATIVE, NORMAL, POSITIVE, SUBNORMAL};
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! Exported formulas: what other programs compute of them.
+//! Exported formulas: what other programs compute from them.
 
 use proptest::prelude::*;
 use residyn_core::expr::parse_finite;

@@ -1,4 +1,4 @@
-//! What an arm hides, drawn by chance in sizes that geared arms have.
+//! The hidden effects of an arm, drawn at random in sizes that geared arms have.
 
 use rand::{Rng, RngExt};
 

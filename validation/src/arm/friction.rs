@@ -1,4 +1,4 @@
-//! What the drivetrains of an arm take beside the motion of its bodies.
+//! The torques that an arm's drivetrains take in addition to the motion of its bodies.
 
 use std::collections::BTreeMap;
 
@@ -86,7 +86,7 @@ impl Friction {
                 bodies.load(number("m")?, at);
                 return Ok(());
             }
-            name => return Err(format!("`{name}` is no effect of the bench's arms")),
+            name => return Err(format!("`{name}` is not an effect of the bench's arms")),
         };
         self.laws[joint].push(law);
         Ok(())

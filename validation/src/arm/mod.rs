@@ -1,4 +1,4 @@
-//! Arms of many joints under stiff control: a motion that is prescribed, and the torques that it takes.
+//! Arms of many joints under stiff control: a prescribed motion, and the torques that it takes.
 
 mod bodies;
 mod draw;
@@ -66,7 +66,7 @@ impl Arm {
     /// # Errors
     /// A model that is not a chain of bodies.
     pub(crate) fn hidden(&self, model: &Model, rng: &mut impl Rng) -> Result<Vec<Hidden>, String> {
-        let bodies = Bodies::of(model).ok_or("its model is no chain of bodies")?;
+        let bodies = Bodies::of(model).ok_or("its model is not a chain of bodies")?;
         let motion = Motion::draw(&self.amplitude, rng);
         Ok(self.draw(&bodies, &motion, rng))
     }
@@ -81,7 +81,7 @@ impl Arm {
         effects: &[Hidden],
         rng: &mut impl Rng,
     ) -> Result<Vec<Log>, String> {
-        let drawn = Bodies::of(model).ok_or("its model is no chain of bodies")?;
+        let drawn = Bodies::of(model).ok_or("its model is not a chain of bodies")?;
         let mut bodies = drawn.off_by(self.bodies, rng);
         let friction = Friction::of(effects, model.joints, &mut bodies)?;
         let lengths = self.seconds.iter().enumerate();
@@ -97,7 +97,7 @@ impl Arm {
 
     fn run(&self, bodies: &Bodies, friction: &Friction, motion: &Motion, seconds: f64) -> Log {
         let mut log = Log::empty(self.amplitude.len());
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some thousand rows
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand rows
         let rows = (self.rate_hz * seconds) as usize;
         for row in 0..rows {
             let time = row as f64 / self.rate_hz;

@@ -1,4 +1,4 @@
-//! Motions that excite an arm: a few harmonics a joint (Swevers et al. 1997).
+//! Motions that excite an arm: a few harmonics per joint (Swevers et al. 1997).
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,4 @@
-//! Draw until every effect matters.
+//! Draws rigs until every effect matters.
 
 use std::collections::BTreeMap;
 
@@ -39,7 +39,7 @@ impl Recipe {
             }
         }
         Err(anyhow!(
-            "of {} draws none had effects that all matter",
+            "none of {} draws had effects that all matter",
             RIGS * EFFECTS
         ))
     }

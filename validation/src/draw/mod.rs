@@ -1,5 +1,5 @@
-//! Rigs drawn by chance, by rules that a grid file holds: which effects they hide and how large, how messy their logs
-//! are, and how far off their model files start.
+//! Rigs drawn at random by the rules in a grid file: which effects they hide and how large, how messy their logs are,
+//! and how far off their model files start.
 
 mod error;
 mod matters;

@@ -1,4 +1,4 @@
-//! One rig, drawn.
+//! One rig drawn at random.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -51,7 +51,7 @@ impl Recipe {
         let joints = self.mechanics.joints();
         if self.speed.len() != joints {
             return Err(format!(
-                "the plant needs {joints} numbers in `speed`, one a joint"
+                "the plant needs {joints} numbers in `speed`, one per joint"
             ));
         }
         let rng = &mut ChaCha8Rng::seed_from_u64(0);

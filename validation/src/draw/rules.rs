@@ -1,4 +1,4 @@
-//! What may be drawn.
+//! The rules by which rigs are drawn.
 
 use std::collections::BTreeMap;
 

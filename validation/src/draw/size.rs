@@ -1,4 +1,4 @@
-//! A number that is drawn.
+//! A number drawn at random from a range.
 
 use std::collections::BTreeMap;
 
@@ -64,7 +64,7 @@ impl Size {
     }
 
     /// A count.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small count
     pub fn count(&self, rng: &mut impl Rng) -> Result<usize, DrawError> {
         Ok(self.plain(rng)?.round() as usize)
     }

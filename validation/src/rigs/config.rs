@@ -143,7 +143,10 @@ fn rigs(path: &Path, text: &str) -> Result<Vec<Rig>, RigsError> {
         let entry = entry.into_inner();
         check(&entry).map_err(|(at, message)| wrong(at, message))?;
         if rigs.iter().any(|rig| rig.name == entry.name) {
-            let message = format!("a rig called {:?} is above; give another name", entry.name);
+            let message = format!(
+                "a rig called {:?} is listed above; give another name",
+                entry.name
+            );
             return Err(wrong(at, message));
         }
         rigs.push(entry.rig(path, &file.plain));

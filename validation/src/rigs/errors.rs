@@ -1,4 +1,4 @@
-//! Open-loop position errors, log by log, which pool over folds.
+//! Open-loop position errors, log by log, so that they can be pooled over folds.
 
 use serde::{Deserialize, Serialize};
 

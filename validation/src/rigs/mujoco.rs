@@ -1,5 +1,5 @@
-//! What mujoco.sysid, the identification toolbox of MuJoCo, makes of a fold: it fits the exported model with the structure
-//! that it is given, and MuJoCo simulates the windows of the test logs, which are scored here.
+//! mujoco.sysid, the identification toolbox of MuJoCo, on a fold: it fits the exported model with its given structure,
+//! and MuJoCo simulates the windows of the test logs, which are scored here.
 
 use std::path::Path;
 

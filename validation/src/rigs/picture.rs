@@ -1,7 +1,7 @@
 //! The errors of the table as a figure.
 
 use super::table::{Entry, Row, Summary};
-use residyn_report::plot::{Bar, ErrorRow, JointKind, PlotError, Role, error_bars};
+use residyn_plot::{Bar, ErrorRow, JointKind, PlotError, Role, error_bars};
 
 /// Models without a colour of their own elsewhere, in the order of their colours; published sets follow.
 const OTHERS: [&str; 2] = ["plain structure", "mujoco.sysid"];

@@ -1,4 +1,4 @@
-//! How closing the loop compares with what else there is, rig by rig.
+//! How closing the loop compares with the alternatives, rig by rig.
 
 use std::collections::BTreeMap;
 

@@ -17,8 +17,8 @@ pub trait Policy {
 /// A plan in which no candidate has a finite return.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
-    "no candidate of the plan at {time_s:.3} s has a finite return: the model leaves the finite numbers in all of them; mend \
-     the model or the objective of the task, or shorten the planner's horizon"
+    "no candidate plan at {time_s:.3} s has a finite return: all of them reach numbers that are not finite; fix the \
+     model or the objective of the task, or shorten the planner's horizon"
 )]
 pub struct LostPlan {
     pub time_s: f64,

@@ -31,7 +31,7 @@ pub enum EpisodeError {
     #[error("{0}")]
     Rig(#[from] PlantError),
     #[error(
-        "the {what} of the task is {value} in the state at {time_s:.3} s, {state:?}; give a formula that is a finite number there"
+        "the {what} of the task is {value} in the state at {time_s:.3} s, {state:?}; give a formula that is finite there"
     )]
     Formula {
         what: &'static str,

@@ -260,23 +260,25 @@ impl Task {
         check_readings("start_spread", self.start_spread.iter().copied())?;
         check_step(self.step_s)?;
         if !(1..=LOG_ROWS).contains(&self.steps) {
-            return Err(format!("`steps` is from 1 to {LOG_ROWS}"));
+            return Err(format!("`steps` must be from 1 to {LOG_ROWS}"));
         }
         self.planner.check().map_err(|error| error.to_string())?;
         if !(1..=self.planner.horizon).contains(&self.replan) {
             return Err(format!(
-                "`replan` is {}, but a plan has {} steps; choose from 1 to these",
+                "`replan` is {}, but a plan has {} steps; choose from 1 to that number",
                 self.replan, self.planner.horizon
             ));
         }
         let Noise { position, velocity } = self.plant.noise;
         if !(position >= 0.0 && velocity >= 0.0) {
-            return Err("`plant.noise` holds standard deviations, which are not negative".into());
+            return Err(
+                "`plant.noise` holds standard deviations; they must not be negative".into(),
+            );
         }
         check_readings("plant.noise", [position, velocity])?;
         if !(self.goal.hold_s >= 0.0) {
             return Err(format!(
-                "`goal.hold_s` is {}; a time is not negative",
+                "`goal.hold_s` is {}; it must not be negative",
                 self.goal.hold_s
             ));
         }
@@ -330,7 +332,7 @@ mod tests {
         };
         assert_eq!(
             message("replan = 50", "replan = 81"),
-            "t.toml: `replan` is 81, but a plan has 80 steps; choose from 1 to these"
+            "t.toml: `replan` is 81, but a plan has 80 steps; choose from 1 to that number"
         );
         let unknown = message("objective = \"cos(q1)\"", "objective = \"cos(q2)\"");
         assert!(

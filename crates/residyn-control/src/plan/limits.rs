@@ -1,4 +1,4 @@
-//! Checks of settings, with messages that name the key, its value and what it may be.
+//! Checks of settings, with messages that name the key, its value and the allowed values.
 
 use std::fmt::Display;
 use std::ops::RangeBounds;

@@ -1,5 +1,5 @@
-//! Sampling-based planning: searches for the input sequence with the highest return within bounds. Planners know no
-//! dynamics; an [`Evaluate`] computes the return of a candidate sequence.
+//! Sampling-based planning: searches for the input sequence with the highest return within bounds. Planners do not know
+//! the dynamics; an [`Evaluate`] computes the return of a candidate sequence.
 
 mod cem;
 mod gaussian;

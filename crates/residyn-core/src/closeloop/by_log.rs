@@ -1,4 +1,4 @@
-//! The chosen model fitted to each training log alone: on which values the logs agree, and how well what is fitted to one of them
+//! The chosen model fitted to each training log alone: on which values the logs agree, and how well the fit to one log
 //! predicts the others.
 
 use std::slice::from_ref;

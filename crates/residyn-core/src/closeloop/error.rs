@@ -9,26 +9,26 @@ use crate::model::Model;
 #[derive(Debug, Error)]
 pub enum StudyError {
     #[error(
-        "the test logs hold no window of {shortest_s} s to score a model on; give longer test logs, or leave out less of \
-         them{found}"
+        "the test logs contain no window of {shortest_s} s to score a model on; give longer test logs, or leave out \
+         less of them{found}"
     )]
     NoTest { shortest_s: f64, found: String },
     #[error(
-        "{model} gives accelerations, and no torques can be compared; give its equations as `mass` and `bias`, or compare the \
-         motion"
+        "{model} gives accelerations, so torques cannot be compared; give its equations as `mass` and `bias`, or \
+         compare the motion"
     )]
     NoTorques { model: String },
     #[error(
-        "{model} is driven by commands, and its logs show no torques that could be compared; compare the motion"
+        "{model} is driven by commands, so its logs have no torques to compare; compare the motion"
     )]
     Commanded { model: String },
     #[error(
-        "calibrating simulates motion, and here torques were compared; do not calibrate, or compare the motion"
+        "the calibration simulates motion, but torques were compared; do not calibrate, or compare the motion"
     )]
     NotOfMotion,
     #[error(
-        "{model} has {free} free parameters, and at most {FITTED_PARAMETERS} are fitted at once; mark those that are known \
-         `fixed = true`"
+        "{model} has {free} free parameters, but at most {FITTED_PARAMETERS} can be fitted at once; mark the known \
+         ones `fixed = true`"
     )]
     TooManyParameters { model: String, free: usize },
     #[error("{0}")]

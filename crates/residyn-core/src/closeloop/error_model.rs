@@ -1,4 +1,4 @@
-//! What a model is compared with the logs by.
+//! The error model: the errors by which a model is compared with the logs.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Which errors say more about some logs.
+//! Choice of the error model: which errors say more about the logs.
 
 use super::fit::NOTHING;
 use super::problem::Problem;

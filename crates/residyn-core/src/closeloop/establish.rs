@@ -203,14 +203,14 @@ impl Evidence {
         }
         if !significant {
             return Some(format!(
-                "p = {p:.2e} is too large among {trials} candidates"
+                "p = {p:.2e} is not significant among {trials} candidates"
             ));
         }
         let confirmed = self.p_of_falls <= settings.confirming_false_alarm
             || self.crossed_gain >= settings.plain_gain;
         (!confirmed).then(|| {
             format!(
-                "with values fitted to one half of the blocks it changes the loss on the other by {:.0} % (p = {:.2})",
+                "fitted to one half of the blocks, it changes the loss on the other half by {:.0} % (p = {:.2})",
                 -100.0 * self.crossed_gain, self.p_of_falls
             )
         })
@@ -222,7 +222,7 @@ fn too_small(gain: f64) -> String {
     let percent = 100.0 * gain.abs();
     match gain < 0.0 {
         true => format!("it raises the loss on left-out blocks by {percent:.1} %"),
-        false => format!("it lowers the loss on left-out blocks by {percent:.1} % only"),
+        false => format!("it lowers the loss on left-out blocks by only {percent:.1} %"),
     }
 }
 
@@ -234,7 +234,7 @@ mod tests {
     fn a_loss_that_rises_is_said_to_rise() {
         let raises = "it raises the loss on left-out blocks by 2.3 %";
         assert_eq!(too_small(-0.0234), raises);
-        let lowers = "it lowers the loss on left-out blocks by 0.4 % only";
+        let lowers = "it lowers the loss on left-out blocks by only 0.4 %";
         assert_eq!(too_small(0.0041), lowers);
         assert_eq!(too_small(0.0), lowers.replace("0.4", "0.0"));
     }

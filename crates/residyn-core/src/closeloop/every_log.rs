@@ -1,5 +1,5 @@
-//! Whether an effect makes the torques of every log fit better. What fits torques best on the whole may be a part of the shape of
-//! another effect, and then it helps on one log and harms on the next.
+//! Whether an effect makes the torques of every log fit better. An effect that fits the torques best overall may
+//! imitate a part of another effect, and then it helps on one log and harms on the next.
 
 use super::establish::Standing;
 use super::fitted::Fitted;

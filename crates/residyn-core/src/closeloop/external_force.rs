@@ -1,5 +1,5 @@
-//! Forces that no column holds: a person pushes, a cable pulls, a limb touches. The fitted model follows the log there
-//! only with a further torque that is far beyond what it needs elsewhere.
+//! External forces that no column records: a person pushes, a cable pulls, a limb touches. The fitted model then
+//! follows the log only with an additional torque far beyond what it needs elsewhere.
 
 use super::diagnostics::ForceSample;
 use super::problem::Problem;
@@ -81,8 +81,8 @@ impl ExternalForce {
             end_s: rounded(self.span.end_s),
         };
         let text = format!(
-            "from {span} the model follows joint {} only with a further force of up to {:.3} N m (N), {:.0} times what it \
-             needs elsewhere: did something push or touch the rig? If so, leave it out",
+            "from {span} the model follows joint {} only with an additional force of up to {:.3} N m (N), {:.0} times \
+             what it needs elsewhere: did something push or touch the rig? If so, leave this interval out",
             self.joint, self.force, self.times
         );
         let finding = Finding::new(Severity::Warning, text).of(self.joint);

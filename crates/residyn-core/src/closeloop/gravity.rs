@@ -1,4 +1,4 @@
-//! Whether the logged torques hold the gravity that the declared bodies need.
+//! Whether the logged torques contain the gravity load of the declared bodies.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,7 +19,10 @@ pub(super) fn report_gravity(
 ) {
     for (share, audit) in shares.iter().zip(audits) {
         if let Some(share) = share.filter(|share| contradicts(*share, settings)) {
-            let text = format!("{}. What is fitted to them imitates that", message(share));
+            let text = format!(
+                "{}. Effects fitted to them imitate the difference",
+                message(share)
+            );
             audit.add(Finding::new(Severity::Serious, text));
         }
     }
@@ -33,7 +36,10 @@ pub(super) fn against_gravity(shares: &[Option<f64>], settings: &NoteSettings) -
     let median = shares
         .get(shares.len() / 2)
         .filter(|share| contradicts(**share, settings))?;
-    Some(format!("{}; effects would imitate that", message(*median)))
+    Some(format!(
+        "{}; effects would imitate the difference",
+        message(*median)
+    ))
 }
 
 fn contradicts(share: f64, settings: &NoteSettings) -> bool {
@@ -43,9 +49,9 @@ fn contradicts(share: f64, settings: &NoteSettings) -> bool {
 
 fn message(share: f64) -> String {
     format!(
-        "the logged torques hold {:.0} % of the gravity that the declared bodies need: they are not all of the joints' torques (a \
-         command without the controller's gravity term, say), or masses, gravity's direction or the unit of the torques are \
-         others",
+        "the logged torques contain {:.0} % of the gravity torque of the declared bodies: they are only a part of the \
+         joint torques (a command without the controller's gravity term, say), or the declared masses, the direction \
+         of gravity or the unit of the torques is wrong",
         100.0 * share
     )
 }

@@ -1,4 +1,4 @@
-//! Stage 5: what the remainder, the single logs and gravity say of the effects that were established.
+//! Stage 5: what the unexplained residual, single logs and gravity say about the established effects.
 
 use rand::Rng;
 use rayon::prelude::*;
@@ -70,15 +70,16 @@ pub(super) fn judge<'a>(
 }
 
 /// Why effects that leave most of the loss and an unexplained residual are not established.
-const MASKING: &str = "an unexplained residual stays, and all effects together cut the loss by less than half: it would \
-                       mask the real cause";
+const MASKING: &str = "an unexplained residual remains, and all effects together cut the loss by less than half: it \
+                       would mask the real cause";
 
 /// Why effects that are fitted to only a part of the torques are not established.
-const ANOTHER_GRAVITY: &str = "the torques hold another gravity than the declared bodies need, and it may imitate what they lack";
+const ANOTHER_GRAVITY: &str = "the torques do not match the gravity torque of the declared bodies, and the effect may \
+                               imitate the difference";
 
 /// Why an effect is not established if the unexplained residual is larger.
 const OUTWEIGHED: &str =
-    "over twice what it explains stays unexplained: it may be a part of the real cause's shape";
+    "more than twice what it explains remains unexplained: it may be only a part of the real cause";
 
 impl Chosen {
     /// Effects are not established if most of what their joint lacks, or more than they explain, stays unexplained.

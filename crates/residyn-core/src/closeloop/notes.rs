@@ -1,4 +1,4 @@
-//! What only fitted models tell of the logs, added to their audits.
+//! Findings about the logs that only fitted models reveal, added to the logs' audits.
 
 use super::diagnostics::residual_force;
 use super::external_force::report_external_forces;
@@ -64,7 +64,8 @@ fn report_too_many(problem: &Problem<'_>, audits: &mut [Audit]) {
     let effects = problem.effects().iter();
     for effect in effects.filter(|effect| is_of_too_many(problem, effect)) {
         let text = format!(
-            "{} has a value for each log and is not looked for in {} logs, but in at most {}: give fewer if the logs may differ by it",
+            "{} has one value per log and is not searched for in {} logs, only in up to {}: give fewer logs if they \
+             may differ in it",
             effect.name,
             problem.logs.len(),
             problem.settings.select.most_logs_of_own_values

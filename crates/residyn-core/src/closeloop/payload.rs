@@ -1,6 +1,6 @@
-//! A load at the tip of an arm. Where the bodies of a chain are free, the last of them can stand for any load, and no torque
-//! distinguishes the two; but a body known from a drawing is off by a fraction, and a missing load makes it a different
-//! one.
+//! A payload at the tip of an arm. If the bodies of a chain are free, the last one can stand for any payload, and no
+//! torque distinguishes the two; but a body known from a drawing is off by a fraction only, and a missing payload would
+//! make it a different body.
 
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};

@@ -1,4 +1,4 @@
-//! Closing the loop, stage by stage, as `docs/method.md` tells it.
+//! Closing the loop, stage by stage, as `docs/method.md` describes it.
 
 use rand::Rng;
 

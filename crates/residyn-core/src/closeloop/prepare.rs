@@ -1,4 +1,4 @@
-//! Stages 1 and 2: the logs in their order, audited, and as fits read them.
+//! Stages 1 and 2: the logs in order, audited, and in the form that fits use.
 
 use std::sync::Arc;
 

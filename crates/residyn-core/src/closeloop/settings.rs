@@ -1,4 +1,4 @@
-//! Every tuning constant of closing the loop, with its reason and unit: one struct a stage, in the order of the stages.
+//! All tuning constants of closing the loop, with reasons and units: one struct per stage, in the order of the stages.
 
 use std::num::NonZeroUsize;
 

@@ -1,5 +1,5 @@
-//! Over which speeds dry friction reverses, where the motion tells: grease, soft gears and the friction of simulators reverse over
-//! far wider speeds than a dry bearing.
+//! Over which speeds dry friction reverses, if the motion shows it: grease, soft gears and simulated friction reverse
+//! over far wider ranges of speed than a dry bearing.
 
 use super::error_model::ErrorModel;
 use super::fitted::Fitted;

@@ -1,4 +1,4 @@
-//! Starting values for a model that diverges with those in its file.
+//! Starting values for a model that diverges with the values in its file.
 
 use super::problem::{Problem, Sample};
 use super::settings::FitSettings;

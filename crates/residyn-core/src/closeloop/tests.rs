@@ -1,4 +1,4 @@
-//! Failures are carried to the report, and settings are heard, on a simulated pendulum with dry friction.
+//! Tests on a simulated pendulum with dry friction: failures reach the report, and settings take effect.
 
 use std::path::Path;
 
@@ -311,7 +311,7 @@ fn an_effect_that_a_remainder_outweighs_is_not_established() {
     let outcome = close_loop(request, &mut rng, &()).unwrap();
     assert!(outcome.effects.findings.is_empty());
     let reason = outcome.effects.supported[0].reason.as_ref().unwrap();
-    assert!(reason.contains("stays unexplained"), "{reason}");
+    assert!(reason.contains("remains unexplained"), "{reason}");
     assert_eq!(outcome.verdict, Verdict::Unexplained);
 }
 

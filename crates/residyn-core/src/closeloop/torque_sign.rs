@@ -1,4 +1,4 @@
-//! Whether the logs drive the joints the other way round than the model does.
+//! Whether the logged torques or commands have the opposite sign to the model's.
 
 use super::fitted::Fitted;
 use super::problem::Problem;

@@ -52,26 +52,25 @@ pub(super) fn verdict(
     }
 }
 
-const STOPPED: &str = "the search was stopped when its time was spent, and more time may find a better set of effects";
+const STOPPED: &str =
+    "the search ran out of time, and with more time it may find a better set of effects";
 
 /// Why nothing can be concluded from logs in which no joint moves.
 fn at_rest(problem: &Problem<'_>) -> Option<String> {
-    (!problem.moves()).then(|| {
-        "no joint moves visibly in any training log: record motion before anything can be said"
-            .into()
-    })
+    (!problem.moves())
+        .then(|| "no joint moves visibly in any training log: record motion first".into())
 }
 
 /// Which fit that the verdict rests on failed or did not converge, if any.
 fn failure(found: &Found<'_>, refined: &Refined<'_>) -> Option<String> {
     if let Some(error) = &found.chosen.failure {
         return Some(format!(
-            "the effects selected on a part of the training logs could not be fitted to all of them: {error}"
+            "the effects selected on part of the training logs could not be fitted to all of them: {error}"
         ));
     }
     if let Some(error) = &refined.failure {
         return Some(format!(
-            "the final fit in fine steps failed, the values are those of the coarser one: {error}"
+            "the final fit in fine steps failed, and the values are those of the coarser fit: {error}"
         ));
     }
     let fit = &refined.after.fit;
@@ -84,12 +83,12 @@ fn inconclusive(problem: &Problem<'_>, known: &Identifiability) -> Option<String
     let windows = problem.shooting.windows.len();
     if windows < settings.fewest_windows {
         return Some(format!(
-            "the training logs hold only {windows} windows of {} s; record more motion",
+            "the training logs contain only {windows} windows of {} s; record more motion",
             problem.settings.fit.window_s
         ));
     }
     (known.free > 0 && known.determined == 0).then(|| {
-        "the training logs determine no parameter of the declared model; move the joints more"
+        "the training logs determine none of the declared model's parameters; move the joints more"
             .into()
     })
 }
@@ -98,7 +97,7 @@ fn inconclusive(problem: &Problem<'_>, known: &Identifiability) -> Option<String
 /// residual is left.
 fn contradicted(established: usize, left: &Unexplained) -> (Verdict, String) {
     let reason = "the effects lower the loss on left-out blocks of the training logs but raise the error on the test \
-                  logs: do not use them before logs of more varied motion confirm them";
+                  logs: do not use them until logs of more varied motion confirm them";
     if !left.is_significant() {
         return (Verdict::Inconclusive, reason.into());
     }
@@ -108,8 +107,10 @@ fn contradicted(established: usize, left: &Unexplained) -> (Verdict, String) {
 
 fn what_is_left(left: &Unexplained) -> String {
     match left.place.as_str() {
-        UNKNOWN => "an unexplained residual depends on none of the variables tested".to_owned(),
-        place => format!("an unexplained residual depends on {place}"),
+        UNKNOWN => {
+            "an unexplained residual remains and depends on none of the variables tested".to_owned()
+        }
+        place => format!("an unexplained residual remains and depends on {place}"),
     }
 }
 
@@ -118,21 +119,21 @@ fn conclusion(added: usize, left: &Unexplained) -> (Verdict, String) {
     match (added, left.is_significant()) {
         (0, false) => (
             Verdict::NoMissingEffect,
-            "no effect of the library lowers the loss on left-out blocks".into(),
+            "no effect in the library lowers the loss on left-out blocks".into(),
         ),
         (0, true) => (
             Verdict::Unexplained,
             format!(
-                "no effect of the library lowers the loss on left-out blocks, and {what_is_left}"
+                "no effect in the library lowers the loss on left-out blocks, and {what_is_left}"
             ),
         ),
         (_, false) => (
             Verdict::Explained,
-            "the effects found leave nothing significant".into(),
+            "the effects found leave no significant residual".into(),
         ),
         (_, true) => (
             Verdict::PartlyExplained,
-            format!("effects were found, and {what_is_left}"),
+            format!("effects were found, but {what_is_left}"),
         ),
     }
 }

@@ -1,4 +1,4 @@
-//! One column of a file: its name, and what turns its numbers into a channel's.
+//! One column of a file: its name, and the conversion of its numbers to those of a channel.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt;

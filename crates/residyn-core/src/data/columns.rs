@@ -319,8 +319,8 @@ impl Header<'_> {
         let joints = joints(&self.names);
         if !joints.is_empty() && quantity == Quantity::Angle {
             return format!(
-                "the log has the joints {}: give those of the model their names, joint_names = [\"{}\", ..] under [system] in \
-                 the model file, or name the columns under [columns]: q = [\"q_{}\", ..]",
+                "the log has the joints {}: give the model's joints these names, joint_names = [\"{}\", ..] under \
+                 [system] in the model file, or name the columns under [columns]: q = [\"q_{}\", ..]",
                 listed(joints.iter().copied()),
                 joints[0],
                 joints[0]
@@ -344,8 +344,8 @@ impl Header<'_> {
                     .iter()
                     .any(|name| name == "cmd1" || name.starts_with("cmd_")) =>
             {
-                return "the log has commands, cmd1: say in [drive] of the model file what torque they make, \
-                        tau1 = \"kp*(cmd1 - q1) - kd*qd1\" for instance; `residyn list drives` shows ready ones"
+                return "the log has commands, cmd1: say in [drive] of the model file which torque they produce, for \
+                        instance tau1 = \"kp*(cmd1 - q1) - kd*qd1\"; `residyn list drives` shows ready-made drives"
                     .to_owned();
             }
             list => format!("{} = [{example:?}]", list.key()),

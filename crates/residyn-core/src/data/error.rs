@@ -1,4 +1,4 @@
-//! What can be wrong with a log file, in words that let its owner repair it.
+//! What can be wrong with a log file, worded so that its owner can fix it.
 
 use std::fmt;
 use std::io;
@@ -179,7 +179,7 @@ pub enum CellFault {
     NotFinite(String),
     /// More than any sensor reads.
     #[error(
-        "{0:e} is beyond {READING:e}, which no sensor reads; delete the row, or cut the log there"
+        "{0:e} is beyond {READING:e}, more than any sensor reads; delete the row, or cut the log there"
     )]
     TooLarge(f64),
     /// A time beyond any clock that counts in seconds.
@@ -190,8 +190,8 @@ pub enum CellFault {
     TooLate(f64),
     /// A pause of very many steps.
     #[error(
-        "time jumps by {pause_s:.1e} s from {previous_place}, with a row every {step_s:.1e} s else; cut the file there into one \
-         log per run"
+        "time jumps by {pause_s:.1e} s from {previous_place}, with a row every {step_s:.1e} s elsewhere; cut the file \
+         there into one log per run"
     )]
     Pause {
         pause_s: f64,
@@ -202,8 +202,8 @@ pub enum CellFault {
     },
     /// A time that is not later than the one before.
     #[error(
-        "time {time} s does not come after {previous} s of {previous_place}; sort the rows, \
-         drop repeated ones, or cut the file into one log per run"
+        "time {time} s does not come after {previous} s in {previous_place}; sort the rows, drop repeated ones, or cut \
+         the file into one log per run"
     )]
     NotLater {
         /// This row's time \[s\].

@@ -1,4 +1,4 @@
-//! The rows of a log that tell what its channels look like and how its joints move.
+//! The rows of a log that are examined for what its channels look like and how its joints move.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -58,7 +58,7 @@ impl Log {
         };
         log.leave_out.extend(intervals.windows(2).map(between));
         log.notes.push(format!(
-            "fits and errors are of {EXAMINED_ROWS} of its {} rows, in {STRETCHES} intervals that are spread evenly over it",
+            "fits and errors use {EXAMINED_ROWS} of its {} rows, in {STRETCHES} intervals spread evenly over it",
             self.rows()
         ));
         log

@@ -1,7 +1,7 @@
-//! Rows by their times.
+//! Finds rows by their times.
 //!
 //! Time stamps are rounded: to decimals when they are written, and to doubles when they are read, which lie a quarter
-//! of a microsecond apart in Unix time. Times that are meant to be equal are taken as equal, so that it does not matter
+//! of a microsecond apart in Unix time. Times that are meant to be equal count as equal, so that it does not matter
 //! when a clock was set to zero.
 
 /// Times nearer to each other than this are the same \[s\]: above any rounding error, and a twentieth of the step of

@@ -71,7 +71,7 @@ impl fmt::Display for Joint {
 
 /// A text that is not the number of a joint.
 #[derive(Debug, Clone, PartialEq, Eq, ThisError)]
-#[error("{0:?} is not a joint's number, which is 1 or more")]
+#[error("{0:?} is not a joint number; joints count from 1")]
 pub struct JointError(String);
 
 impl FromStr for Joint {

@@ -1,4 +1,4 @@
-//! Single readings that jump: a bit lost on a bus, a frame that was damaged.
+//! Single readings that jump: a bit lost on a bus, a damaged frame.
 
 use super::examined::at_examined;
 use super::signal::resolution;

@@ -1,4 +1,4 @@
-//! Channels on other clocks: values that were taken so long before the times of their rows.
+//! Channels on other clocks, whose values were taken a given time before the times of their rows.
 
 use super::instant::{row_after, row_from};
 use super::log::Log;

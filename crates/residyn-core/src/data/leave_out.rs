@@ -21,7 +21,7 @@ pub struct LeaveOut {
 pub enum LeaveOutError {
     /// The text is not of the form `LOG@t0-t1`.
     #[error(
-        "{text:?} is no interval of a log; write LOG@START-END in seconds, such as rig.csv@15.8-16.4"
+        "{text:?} is not an interval of a log; write LOG@START-END in seconds, such as rig.csv@15.8-16.4"
     )]
     Syntax {
         /// The text as given.

@@ -1,8 +1,8 @@
 //! Position, velocity and acceleration at a row, from the logged positions around it.
 //!
-//! Velocities that rigs report are too noisy or too filtered to start a prediction from. A cubic
-//! fitted by least squares to the positions on either side has no lag, takes irregular sampling as it
-//! is, and follows accelerations that change over the window.
+//! Velocities that rigs report are too noisy or too filtered to start a prediction from. A cubic fitted by least
+//! squares to the positions on either side has no lag, copes with irregular sampling, and follows accelerations that
+//! change over the window.
 
 use std::ops::Range;
 

@@ -1,10 +1,9 @@
 //! Logs of mechanical rigs in memory: columns, audit, statistics.
 //!
-//! A [`Log`] is one trajectory: times, joint angles, joint velocities and joint torques, in s, rad,
-//! rad/s and N m. [`Log::of_table`] takes it from named columns and refuses what it cannot read with an
-//! error that names place, column and remedy; numbers are never repaired. [`audit`] measures the
-//! quality of a log (sampling, noise, spikes, lags, excitation) and puts what matters for fitting a
-//! model into plain sentences.
+//! A [`Log`] is one trajectory: times, joint angles, joint velocities and joint torques, in s, rad, rad/s and N m.
+//! [`Log::of_table`] makes it from named columns and rejects what it cannot read with an error that names place, column
+//! and remedy; numbers are never repaired. [`audit`] measures the quality of a log (sampling, noise, spikes, lags,
+//! excitation) and puts what matters for fitting a model into plain sentences.
 //!
 //! The torque of row `i` acts from `time[i]` to `time[i + 1]` (zero-order hold).
 

@@ -1,4 +1,4 @@
-//! Linear regression by orthonormal columns: the part of a series that a basis explains, and the rest.
+//! Linear regression on orthonormal columns: the part of a series that a basis explains, and the rest.
 
 /// Orthogonal columns of unit length that span the same space; columns that the others already span are dropped.
 pub(super) fn orthonormal(columns: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {

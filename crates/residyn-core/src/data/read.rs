@@ -1,4 +1,4 @@
-//! Reading a log from the table that a file holds.
+//! Reads a log from the table in a file.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -98,7 +98,8 @@ fn check_joints(path: &Path, joints: usize) -> Result<(), LogError> {
         false => Err(LogError::Form {
             path: path.to_owned(),
             fault: format!(
-                "has {joints} joints; at most {LOG_JOINTS} are read: give a model that names its own under [columns]"
+                "has {joints} joints; at most {LOG_JOINTS} are read: give a model that names its columns under \
+                 [columns]"
             ),
         }),
     }
@@ -190,7 +191,7 @@ fn log(
         if cell.wrapped {
             let (name, passed) = (&header.names[cell.index], unwrap(&mut values, TAU));
             notes.push(format!(
-                "{name} passes the end of its turn {passed} times: full turns are counted"
+                "{name} wraps {passed} times: full turns are counted"
             ));
         }
         Ok(late::undone(&time, values, cell.late_s))

@@ -1,4 +1,4 @@
-//! The motion of a log as the torque error reads it: even steps, low-pass filtered, differentiated.
+//! The motion of a log as the torque error uses it: resampled at even steps, low-pass filtered, differentiated.
 
 use super::instant::{ROUNDING, SAME_S};
 use super::log::Log;

@@ -1,4 +1,4 @@
-//! Medians, quantiles, spreads and intervals, for every room that needs them.
+//! Medians, quantiles, spreads and intervals, shared by all modules.
 //!
 //! Ties and NaN are ordered by [`f64::total_cmp`]. Functions that return 0 for an empty sample say so; the others need
 //! at least one value.

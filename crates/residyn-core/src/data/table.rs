@@ -1,4 +1,4 @@
-//! Named columns of numbers: what a log is made of, in memory or as a reader of a format finds it in a file.
+//! Named columns of numbers from which a log is made, in memory or as the reader of a format finds them in a file.
 
 use std::mem;
 

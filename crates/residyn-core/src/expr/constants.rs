@@ -1,4 +1,4 @@
-//! Parts of a formula that are no finite numbers whatever its names stand for.
+//! Parts of a formula that are not finite, whatever values its names have.
 
 use super::FormulaError;
 use super::op::{Binary, Function, Unary};
@@ -22,7 +22,7 @@ fn constant(term: &Term) -> Result<Option<f64>, Fault> {
         Kind::Negate(a) => constant(a)?.map(|a| -a),
         Kind::Infix(infix, a, b) => match (*infix, constant(a)?, constant(b)?) {
             (Infix::Plain(Binary::Div), _, Some(0.0)) => {
-                return fault("this is divided by zero".to_owned());
+                return fault("this divides by zero".to_owned());
             }
             (Infix::Plain(Binary::Mul | Binary::Div), Some(0.0), _)
             | (Infix::Plain(Binary::Mul), _, Some(0.0)) => Some(0.0),
@@ -35,7 +35,7 @@ fn constant(term: &Term) -> Result<Option<f64>, Fault> {
         }
     };
     match value {
-        Some(value) if !value.is_finite() => fault(format!("this is {value}, no finite number")),
+        Some(value) if !value.is_finite() => fault(format!("this is {value}, not a finite number")),
         _ => Ok(value),
     }
 }

@@ -1,9 +1,8 @@
-//! Equations as programs: a formula is text, is parsed once, and becomes a [`Program`],
-//! a flat list of about two dozen scalar operations. Everything else reads that list:
-//! the evaluator ([`Tape`]), the derivative ([`Graph::gradient`]), the replay on tensors of training
-//! and the printers ([`Program::text`], [`Program::latex`]).
+//! Equations as programs: a formula is text that is parsed once and becomes a [`Program`], a flat list of about two
+//! dozen scalar operations. Everything else reads that list: the evaluator ([`Tape`]), the derivative
+//! ([`Graph::gradient`]), the replay on tensors of training and the printers ([`Program::text`], [`Program::latex`]).
 //!
-//! This module knows no file, no optimiser and no command line.
+//! This module knows nothing of files, optimisers and command lines.
 
 mod constants;
 mod error;

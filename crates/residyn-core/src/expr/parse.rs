@@ -152,14 +152,14 @@ const INFIX: &[(&str, Infix, u8, u8)] = &[
 const PREFIX_POWER: u8 = 7;
 
 /// What to do about a formula that is too deep.
-const REMEDY: &str = "give parts of it names of their own under [dynamics.let]";
+const REMEDY: &str = "name parts of it under [dynamics.let]";
 
 impl<'a> Parser<'a> {
     /// Reads everything that binds at least as strongly as `power`.
     fn infix(&mut self, power: u8) -> Result<Term, FormulaError> {
         if self.depth == FORMULA_NESTING {
             return Err(self.error_here(format!(
-                "lies within more than {FORMULA_NESTING} parentheses, calls, signs or powers; {REMEDY}"
+                "is nested in more than {FORMULA_NESTING} parentheses, calls, signs or powers; {REMEDY}"
             )));
         }
         self.depth += 1;
@@ -378,7 +378,7 @@ mod tests {
         let message_of = |text: &str| parse_finite(text).unwrap_err().to_string();
         assert_eq!(
             message_of("a + 1e200 * 1e200"),
-            "this is inf, no finite number\n    a + 1e200 * 1e200\n        ^^^^^^^^^^^^^"
+            "this is inf, not a finite number\n    a + 1e200 * 1e200\n        ^^^^^^^^^^^^^"
         );
         assert!(message_of("log(1 - 1) * a").starts_with("this is -inf"));
         for zero in [
@@ -387,7 +387,7 @@ mod tests {
             "a / where(1 > 2, 3, clamp(-1, 0, 1))",
         ] {
             assert!(
-                message_of(zero).starts_with("this is divided by zero"),
+                message_of(zero).starts_with("this divides by zero"),
                 "{zero}"
             );
         }

@@ -1,4 +1,4 @@
-//! The units of a formula, from those of its names.
+//! The units of a formula, derived from those of its names.
 
 use super::FormulaError;
 use super::error::shortened;
@@ -111,7 +111,7 @@ impl Reader<'_> {
     fn pure(&mut self, term: &Term, of: &Term) {
         if let Some(unit) = self.term(term).filter(|unit| *unit != Unit::ONE) {
             let message = format!(
-                "{} in `{}` has to be a pure number or an angle",
+                "{} in `{}` must be a pure number or an angle",
                 self.with_unit(term, unit),
                 shortened(&self.text[of.span.clone()])
             );
@@ -122,7 +122,7 @@ impl Reader<'_> {
     fn power(&mut self, whole: &Term, base: &Term, exponent: &Term) -> Option<Unit> {
         let unit = self.term(base);
         if let Kind::Number(number) = exponent.kind {
-            #[allow(clippy::cast_possible_truncation)] // the guard
+            #[allow(clippy::cast_possible_truncation)] // bounded by the guard
             return match number {
                 0.5 => unit?.root(),
                 whole if whole.fract() == 0.0 && whole.abs() < 100.0 => {
@@ -189,8 +189,8 @@ mod tests {
     fn what_does_not_fit_is_reported_with_its_units() {
         for (formula, message) in [
             ("m*g*l + m*g", "`m*g*l` [N m] and `m*g` [N] cannot be added"),
-            ("sin(l)", "`l` [m] in `sin(l)` has to be a pure number"),
-            ("2^m", "`m` [kg] in `2^m` has to be a pure number"),
+            ("sin(l)", "`l` [m] in `sin(l)` must be a pure number"),
+            ("2^m", "`m` [kg] in `2^m` must be a pure number"),
             ("clamp(l, -m, m)", "`l` [m] and `-m` [kg] cannot be added"),
             ("where(qd1 > g, 1, 2)", "`qd1` [1/s] and `g` [m/s^2] cannot"),
         ] {

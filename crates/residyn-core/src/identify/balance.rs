@@ -1,4 +1,4 @@
-//! The torques that logged motions need, beside those that act: windows of smoothed logs, one a lane.
+//! The torques that logged motions need, compared with those that act: windows of smoothed logs, one per lane.
 
 use super::normal_equations::{Reduced, WindowTerms};
 use super::sensitivity::{LANES, Lane, Tangent};

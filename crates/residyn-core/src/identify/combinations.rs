@@ -1,5 +1,6 @@
-//! Which combinations of the bodies' parameters the logs tell: base parameters (Gautier 1991), found from the information that a
-//! fit has, so that combinations that the motion does not excite are left out, as well as those that no motion could.
+//! Which combinations of the bodies' parameters the logs determine: base parameters (Gautier 1991), found from the
+//! information in a fit, so that combinations that the motion does not excite are left out, as well as those that no
+//! motion could determine.
 
 use nalgebra::DMatrix;
 use rand::SeedableRng;

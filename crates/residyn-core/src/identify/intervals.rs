@@ -103,7 +103,7 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
 fn excess(fit: &Fit, covariance: &DMatrix<f64>) -> f64 {
     let bodies = &fit.bodies.hessian;
     let of_bodies = (0..bodies.nrows()).filter(|i| bodies[(*i, *i)] > 0.0);
-    #[allow(clippy::cast_precision_loss)] // some tens
+    #[allow(clippy::cast_precision_loss)] // a few tens
     let message = of_bodies.count() as f64 - (covariance * bodies).trace();
     (2.0 * fit.bodies.cost / message.max(1.0)).max(1.0)
 }

@@ -1,5 +1,5 @@
-//! Normal equations of windows. A window's own values (its start state, and forces where they are free) enter no other
-//! window, so they are eliminated by the Schur complement before windows are summed.
+//! Normal equations of windows. A window's own values (its start state, and forces if they are free) do not enter other
+//! windows, so they are eliminated by the Schur complement before windows are summed.
 
 use nalgebra::{DMatrix, DVector};
 

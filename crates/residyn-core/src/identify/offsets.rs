@@ -22,7 +22,7 @@ pub enum CalibrateError {
         "a calibration on the fraction {0} of each log is not possible; give a number above 0 and below 1"
     )]
     Fraction(f64),
-    #[error("{log}: its first {seconds:.2} s do not give its sensor offsets: {source}")]
+    #[error("{log}: its first {seconds:.2} s do not determine its sensor offsets: {source}")]
     Fit {
         log: String,
         seconds: f64,

@@ -11,11 +11,11 @@ use crate::decomposition::eigen;
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum FitError {
     #[error(
-        "the logs give no window to fit: every block is shorter than a window, broken by a gap or left out; record longer logs or leave out less"
+        "the logs contain no window to fit: every block is shorter than a window, broken by a gap or left out; record longer logs or leave out less"
     )]
     NoWindow,
     #[error(
-        "with its starting values the model diverges in {diverged} of {windows} windows of the logs; give parameters nearer to the rig in the model file"
+        "with its starting values the model diverges in {diverged} of {windows} windows of the logs; give parameters closer to those of the rig in the model file"
     )]
     Diverged { diverged: usize, windows: usize },
 }
@@ -139,14 +139,14 @@ impl Termination {
 impl fmt::Display for Termination {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::SmallDecrease => "converged: the last step hardly lowered the loss",
+            Self::SmallDecrease => "converged: the last step barely lowered the loss",
             Self::SmallPredictedDecrease => "converged: no step lowers the loss any further",
             Self::NoDescent => {
                 "not converged: no step lowers the loss, although its derivatives predict a decrease"
             }
             Self::Singular => "not converged: the normal equations cannot be solved",
             Self::StepLimit => "not converged: the loss was still falling at the last step allowed",
-            Self::GivenUp => "not converged: given up, the loss was not coming down far enough",
+            Self::GivenUp => "not converged: stopped early, the loss was not falling far enough",
             Self::AsGiven => "evaluated as given",
         })
     }

@@ -1,4 +1,4 @@
-//! Windows integrated side by side, one a lane.
+//! Windows integrated side by side, one per lane.
 
 use super::normal_equations::WindowTerms;
 use super::sensitivity::{LANES, Lane, Tangent, TangentStepper};

@@ -1,7 +1,7 @@
 //! Sine, cosine, exponential and hyperbolic tangent of vectors, accurate to two units in the last place. Scalar code
 //! and the rarer functions use the standard library.
 //!
-//! `scripts/polynomials` computes the polynomials, and checks that the coefficients here are the ones that it finds.
+//! `scripts/polynomials` computes the polynomials and checks the coefficients here against them.
 
 use pulp::Simd;
 

@@ -28,7 +28,7 @@ pub(super) fn chain(
     let places: Vec<Place> = places.collect::<Result<_, _>>()?;
     let moves = |joint: &Joint| places.iter().any(|place| place.joint == *joint);
     if let Some(still) = Joint::all(prismatic.len()).find(|joint| !moves(joint)) {
-        let message = format!("no [[chain.link]] has `joint = {still}`; each joint moves one");
+        let message = format!("no [[chain.link]] has `joint = {still}`; each joint needs one");
         return Err(section.error(message));
     }
     Ok(Bodies {
@@ -53,7 +53,7 @@ fn place(link: &Section<'_>, prismatic: &[bool]) -> Result<Place, FileError> {
     let x = x.normalize();
     let joint = link.whole("joint")?.and_then(Joint::numbered);
     let Some(joint) = joint.filter(|joint| joint.is_of(prismatic.len())) else {
-        let message = format!("`joint` is a number from 1 to {}", prismatic.len());
+        let message = format!("`joint` must be a number from 1 to {}", prismatic.len());
         return Err(link.error_at("joint", message));
     };
     Ok(Place {
@@ -76,13 +76,13 @@ fn direction(link: &Section<'_>, key: &str) -> Result<Vector3<f64>, FileError> {
     let given = vector(link, key)?;
     given
         .try_normalize(0.0)
-        .ok_or_else(|| link.error_at(key, format!("`{key}` is a direction, found zeros")))
+        .ok_or_else(|| link.error_at(key, format!("`{key}` must be a direction, found zeros")))
 }
 
 fn vector(link: &Section<'_>, key: &str) -> Result<Vector3<f64>, FileError> {
     match link.numbers(key)?.as_deref() {
         Some([x, y, z]) => Ok(Vector3::new(*x, *y, *z)),
-        Some(_) => Err(link.error_at(key, format!("`{key}` is a list of three numbers"))),
+        Some(_) => Err(link.error_at(key, format!("`{key}` must be a list of three numbers"))),
         None => Err(link.error(format!("`{key}` is missing; give three numbers"))),
     }
 }
@@ -103,7 +103,7 @@ fn formulas<const N: usize>(
 ) -> Result<[Located<Formula>; N], FileError> {
     let texts = section.texts(key)?.unwrap_or_default();
     if texts.len() != N {
-        let message = format!("`{key}` is a list of {N} formulas");
+        let message = format!("`{key}` must be a list of {N} formulas");
         return Err(section.error_at(key, message));
     }
     let formulas = texts.iter().map(|text| document.formula(text));

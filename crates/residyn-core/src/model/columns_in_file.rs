@@ -57,7 +57,7 @@ fn list(
     };
     if given.len() != joints {
         let message = format!(
-            "`{key}` needs one column a joint: {joints}, found {}",
+            "`{key}` needs one column per joint: {joints}, found {}",
             given.len()
         );
         return Err(section.error_at(key, message));
@@ -83,7 +83,7 @@ fn column(entry: NameOrTable<'_>, quantity: Quantity) -> Result<Column, FileErro
     }
     let late_s = table.number("late")?.unwrap_or(0.0);
     if !late_s.is_finite() || (late_s != 0.0 && quantity == Quantity::Time) {
-        let message = "`late` is a time in s, of columns other than `time`";
+        let message = "`late` must be a time in s, for columns other than `time`";
         return Err(table.error_at("late", message));
     }
     Ok(Column {

@@ -1,4 +1,5 @@
-//! What becomes of the commands of a rig that is not driven by torques: a servo with position targets, a motor under voltage.
+//! The torques that commands lead to on a rig that is not driven by torques: a servo with position targets, a motor
+//! under voltage.
 
 use std::sync::Arc;
 

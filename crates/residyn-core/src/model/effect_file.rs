@@ -113,7 +113,7 @@ fn baseline(section: &Section<'_>) -> Result<Option<usize>, FileError> {
     match section.whole("baseline")? {
         Some(0) => Err(section.error_at(
             "baseline",
-            "`baseline` is a rank from 1 on; leave it out for an effect that few machines have",
+            "`baseline` must be a rank of at least 1; leave it out for an effect that few machines have",
         )),
         rank => Ok(rank),
     }
@@ -206,7 +206,10 @@ fn parameter(name: String, section: &Section<'_>) -> Result<EffectParameter, Fil
     section.only(PARAMETER_KEYS)?;
     let typical = section.required_number("typical")?;
     if typical <= 0.0 {
-        return Err(section.error_at("typical", "`typical` is a magnitude: a number above zero"));
+        return Err(section.error_at(
+            "typical",
+            "`typical` must be a magnitude: a number above zero",
+        ));
     }
     let starts = match section.numbers("search")? {
         Some(values) if values.is_empty() => {

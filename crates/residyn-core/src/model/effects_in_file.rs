@@ -56,9 +56,12 @@ fn fitted(
 /// `joint = 2`
 fn one(section: &Section<'_>, joints: usize) -> Result<Joint, FileError> {
     let joint = section.whole("joint")?.and_then(Joint::numbered);
-    joint
-        .filter(|joint| joint.is_of(joints))
-        .ok_or_else(|| section.error_at("joint", format!("`joint` is a number from 1 to {joints}")))
+    joint.filter(|joint| joint.is_of(joints)).ok_or_else(|| {
+        section.error_at(
+            "joint",
+            format!("`joint` must be a number from 1 to {joints}"),
+        )
+    })
 }
 
 /// The first of `joints = [5, 6]`, two joints in a row.
@@ -68,7 +71,7 @@ fn pair(section: &Section<'_>, joints: usize) -> Result<Joint, FileError> {
     let mut pairs = Joint::all(joints.saturating_sub(1));
     pairs.find(is_it).ok_or_else(|| {
         let message = format!(
-            "`joints` are two joints in a row, [1, 2] to [{}, {joints}]",
+            "`joints` must be two consecutive joints, [1, 2] to [{}, {joints}]",
             joints - 1
         );
         section.error_at("joints", message)
@@ -81,7 +84,7 @@ fn status(section: &Section<'_>) -> Result<Option<Status>, FileError> {
         return Ok(None);
     };
     let unknown = || {
-        let message = "`status` is \"established\" or \"supported\"";
+        let message = "`status` must be \"established\" or \"supported\"";
         section.error_at("status", message.to_owned())
     };
     Status::named(&name.value).map(Some).ok_or_else(unknown)

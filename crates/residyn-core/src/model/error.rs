@@ -20,22 +20,22 @@ pub enum ModelError {
         near: String,
     },
     /// The effect acts only on a first joint that turns.
-    #[error("`{effect}` acts on the first joint, where that turns")]
+    #[error("`{effect}` acts on the first joint only, which must be revolute")]
     FirstJointOnly { effect: String },
     /// The effect acts only on the last joint of a chain of bodies.
-    #[error("`{effect}` acts on the last joint of a chain of bodies")]
+    #[error("`{effect}` acts only on the last joint of a chain of bodies")]
     LastJointOnly { effect: String },
     /// The effect acts only on two neighbouring joints of one kind.
-    #[error("`{effect}` acts on two joints in a row that both turn or both slide")]
+    #[error("`{effect}` acts on two consecutive joints that are both revolute or both prismatic")]
     NeighboursOfOneKind { effect: String },
     /// The effect is part of the inertia, which the model does not give.
     #[error("`{effect}` needs a model that gives `mass` and `bias`; {model} gives accelerations")]
     NeedsMass { effect: String, model: String },
     /// The model already has this effect, or one that excludes it, on the joint.
-    #[error("`{effect}` acts on joint {joint} already")]
+    #[error("`{effect}` already acts on joint {joint}")]
     Twice { effect: String, joint: Joint },
     /// A parameter has a value outside its bounds.
-    #[error("`{effect}`: {parameter} = {value} lies outside of {low} to {high}")]
+    #[error("`{effect}`: {parameter} = {value} is outside {low} to {high}")]
     OutOfBounds {
         effect: String,
         parameter: String,

@@ -1,4 +1,4 @@
-//! Networks that add nothing where they were not trained.
+//! Networks whose output fades to zero away from the motion that they were trained on.
 
 use nalgebra::{Cholesky, DMatrix};
 
@@ -22,7 +22,7 @@ impl Seen {
     fn of(rows: &[Vec<f64>], scaled: impl Fn(&[f64]) -> Vec<f64>) -> Self {
         let rows: Vec<Vec<f64>> = rows.iter().map(|row| scaled(row)).collect();
         let size = rows[0].len();
-        #[allow(clippy::cast_precision_loss)] // some thousands
+        #[allow(clippy::cast_precision_loss)] // a few thousand
         let all = DMatrix::from_fn(rows.len(), size, |row, k| {
             rows[row][k] / (rows.len() as f64).sqrt()
         });
@@ -76,7 +76,7 @@ impl MlpWeights {
         let seen = Seen::of(&features, |row| self.scaled(row));
         let largest = self.largest(rows);
         if largest.iter().all(|most| *most == 0.0) {
-            return self.clone(); // It is silent already.
+            return self.clone(); // Its output is zero already.
         }
         let mut layers = self.layers.clone();
         while layers.len() < 3 {

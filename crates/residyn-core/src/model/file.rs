@@ -90,7 +90,7 @@ impl Model {
             .map(|(name, _)| ("dynamics", name));
         for (section, name) in parameters.chain(lets) {
             let fault = if !parse(name).is_ok_and(|formula| formula.is_name(name)) {
-                "is none that formulas can use; take letters, digits and _"
+                "cannot be used in formulas; use letters, digits and _"
             } else if taken.contains(name) {
                 "is taken; choose another"
             } else {
@@ -123,7 +123,7 @@ impl Model {
             if let Some(later) = later.find(|later| formula.value.names().contains(later)) {
                 let message = match circle(lets, name, later) {
                     Some(circle) => format!(
-                        "`{name}` is defined by itself: {circle}; write one of these without the next"
+                        "`{name}` is defined in terms of itself: {circle}; write one of these without the next"
                     ),
                     None => {
                         format!("`{name}` uses `{later}`, which is defined after it; move it up")

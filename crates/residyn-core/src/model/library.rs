@@ -135,7 +135,7 @@ impl Library {
             Some(text) => self.model_from_text(name, text),
             None => {
                 let known = Self::system_names().join(", ");
-                let message = format!("no built-in system is called so; give one of {known}");
+                let message = format!("no built-in system has this name; give one of {known}");
                 Err(FileError::new(name.as_ref(), None, message))
             }
         }

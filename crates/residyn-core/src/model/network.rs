@@ -59,7 +59,7 @@ pub(super) fn check_hidden(hidden: &[usize]) -> Result<(), String> {
         .any(|width| !(1..=LAYER_WIDTH).contains(width))
     {
         return Err(format!(
-            "`hidden` lists layer widths: whole numbers from 1 to {LAYER_WIDTH}"
+            "`hidden` must list layer widths: whole numbers from 1 to {LAYER_WIDTH}"
         ));
     }
     let numbers: usize = hidden.windows(2).map(|pair| pair[0] * pair[1]).sum();
@@ -133,7 +133,7 @@ pub struct InputScaling {
 #[error(
     "a network with layer widths {widths:?} does not fit {joints} joints: it must begin with \
      {features} features, end with {outputs} outputs and have no empty layer; change `hidden`, \
-     or take the network that was trained for this system"
+     or use the network that was trained for this system"
 )]
 pub struct NetworkError {
     pub joints: usize,

@@ -255,7 +255,7 @@ impl<'a> Section<'a> {
             Some(&[low, high]) if low < high => Ok([low.max(lowest), high]),
             Some(_) => Err(self.error_at(
                 "bounds",
-                "`bounds` is a list of two rising numbers, such as [0, 2]",
+                "`bounds` must be a list of two increasing numbers, such as [0, 2]",
             )),
         }
     }
@@ -271,11 +271,11 @@ impl<'a> Section<'a> {
         let chosen = choices.iter().find(|(name, _)| *name == text);
         chosen
             .map(|(_, value)| *value)
-            .ok_or_else(|| self.error_at(key, format!("`{key}` is {allowed}, found {text:?}")))
+            .ok_or_else(|| self.error_at(key, format!("`{key}` must be {allowed}, found {text:?}")))
     }
 
     pub fn texts(&self, key: &str) -> Result<Option<Vec<Located<String>>>, FileError> {
-        self.list(key, "a list of texts", Self::text_of)
+        self.list(key, "a list of strings", Self::text_of)
     }
 
     pub fn name_or_table(&self, key: &str) -> Result<Option<NameOrTable<'a>>, FileError> {
@@ -445,7 +445,7 @@ impl<'a> Section<'a> {
         let text = value
             .get_ref()
             .as_str()
-            .ok_or_else(|| self.wrong(value, key, "a text in quotes"))?;
+            .ok_or_else(|| self.wrong(value, key, "a string in quotes"))?;
         Ok(Located {
             value: text.to_owned(),
             at: value.span().start,
@@ -458,7 +458,7 @@ impl<'a> Section<'a> {
         if number.is_finite() {
             return Ok(number);
         }
-        let message = format!("`{key}` is no finite number; write one, such as 0.25");
+        let message = format!("`{key}` is not a finite number; write one, such as 0.25");
         Err(self.document.error(value.span().start, message))
     }
 

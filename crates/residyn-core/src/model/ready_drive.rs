@@ -1,4 +1,4 @@
-//! Drives that many rigs have, ready to be written into model files.
+//! Common drives, ready to be written into model files.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What is saved of a model beside its equations: its learnable numbers in plain form, and their shape.
+//! What is saved of a model besides its equations: its learnable numbers in plain form, and their shape.
 
 use std::path::PathBuf;
 
@@ -78,7 +78,7 @@ impl Origin {
 #[derive(Debug, thiserror::Error)]
 pub enum SavedModelError {
     #[error(
-        "the checkpoint's file {file:?} is damaged ({reason}); take another copy or train again, in \
+        "the checkpoint's file {file:?} is damaged ({reason}); use another copy or train again, in \
          {dir:?}"
     )]
     Corrupt {

@@ -27,10 +27,10 @@ pub(super) fn joints(section: &Section<'_>) -> Result<usize, FileError> {
     match section.whole("joints")? {
         Some(joints @ 1..=JOINTS) => Ok(joints),
         Some(joints) => {
-            let message = format!("`joints` is from 1 to {JOINTS}, found {joints}");
+            let message = format!("`joints` must be from 1 to {JOINTS}, found {joints}");
             Err(section.error_at("joints", message))
         }
-        None => Err(section.error("`joints` is missing in [system]; give their number")),
+        None => Err(section.error("`joints` is missing in [system]; give the number of joints")),
     }
 }
 
@@ -42,7 +42,8 @@ pub(super) fn joint_names(section: &Section<'_>, joints: usize) -> Result<Vec<St
     let names: Vec<String> = names.into_iter().map(|name| name.value).collect();
     let distinct: HashSet<&str> = names.iter().map(|name| name.trim()).collect();
     if names.len() != joints || distinct.len() != joints || distinct.contains("") {
-        let message = format!("`joint_names` is a list of {joints} different names, one a joint");
+        let message =
+            format!("`joint_names` must be a list of {joints} different names, one per joint");
         return Err(section.error_at("joint_names", message));
     }
     Ok(names)
@@ -53,7 +54,7 @@ pub(super) fn prismatic(section: &Section<'_>, joints: usize) -> Result<Vec<bool
     let listed = section.numbers("prismatic")?.unwrap_or_default();
     let numbers: Vec<f64> = (1..=joints).map(|j| j as f64).collect();
     if let Some(stranger) = listed.iter().find(|j| !numbers.contains(j)) {
-        let message = format!("`prismatic` lists joints from 1 to {joints}, found {stranger}");
+        let message = format!("`prismatic` must list joints from 1 to {joints}, found {stranger}");
         return Err(section.error_at("prismatic", message));
     }
     Ok(numbers.iter().map(|j| listed.contains(j)).collect())
@@ -68,7 +69,7 @@ pub(super) fn smoothing_velocity(
     match &widths {
         Some(widths) if widths.len() != joints || widths.iter().any(|w| *w <= 0.0) => {
             let message = format!(
-                "`smoothing_velocity` is a list of {joints} speeds above zero, one a joint"
+                "`smoothing_velocity` must be a list of {joints} speeds above zero, one per joint"
             );
             Err(section.error_at("smoothing_velocity", message))
         }
@@ -93,7 +94,7 @@ fn parameter(name: String, section: &Section<'_>) -> Result<Parameter, FileError
     let bounds = section.bounds()?;
     if !(bounds[0]..=bounds[1]).contains(&value) {
         let message = format!(
-            "`value` {value} lies outside of its bounds {} to {}",
+            "`value` {value} is outside its bounds {} to {}",
             bounds[0], bounds[1]
         );
         return Err(section.error_at("value", message));
@@ -117,7 +118,7 @@ pub(super) fn interval(section: &Section<'_>, key: &str) -> Result<Option<[f64; 
         None => Ok(None),
         Some(numbers) => match numbers[..] {
             [low, high] => Ok(Some([low, high])),
-            _ => Err(section.error_at(key, format!("`{key}` is a list of two numbers"))),
+            _ => Err(section.error_at(key, format!("`{key}` must be a list of two numbers"))),
         },
     }
 }
@@ -195,8 +196,9 @@ pub(super) fn motion(
     let mass = dynamics.matrix("mass")?.unwrap_or_default();
     let bias = dynamics.texts("bias")?.unwrap_or_default();
     if mass.len() != joints || mass.iter().any(|row| row.len() != joints) || bias.len() != joints {
-        let message =
-            format!("`mass` is {joints} rows of {joints} formulas and `bias` is {joints} formulas");
+        let message = format!(
+            "`mass` must be {joints} rows of {joints} formulas and `bias` {joints} formulas"
+        );
         return Err(dynamics.error_at("mass", message));
     }
     let row = |row: &Vec<Located<String>>| row.iter().map(|text| document.formula(text)).collect();

@@ -66,15 +66,12 @@ fn shift(k: usize, declared: &Parameter) -> Effect {
     };
     Effect {
         name: NAME.into(),
-        about: format!(
-            "`{}` has another value than the file declares",
-            declared.name
-        ),
+        about: format!("`{}` differs from its declared value", declared.name),
         entry: Entry::Shift(k, formula),
         parameters: vec![EffectParameter {
             name: declared.name.clone(),
             unit: declared.unit.clone(),
-            about: "actual value less the declared one".into(),
+            about: "actual value minus the declared one".into(),
             typical: 0.1 * declared.scale,
             bounds: [least - declared.value, high - declared.value],
             starts: vec![0.0],

@@ -21,7 +21,7 @@ pub enum PlantError {
     File { path: PathBuf, message: String },
     #[error(transparent)]
     Effect(#[from] ModelError),
-    #[error("effect `{effect}`: `joint` is from 1 to {joints}, found {found}")]
+    #[error("effect `{effect}`: `joint` must be from 1 to {joints}, found {found}")]
     Joint {
         effect: String,
         joints: usize,
@@ -45,11 +45,11 @@ pub enum PlantError {
     #[error("{0}")]
     Sampling(String),
     #[error(
-        "the simulated rig diverges at {time_s:.3} s; give it less torque, or parameters of a real rig"
+        "the simulated rig diverges at {time_s:.3} s; give it less torque, or realistic parameters"
     )]
     Diverged { time_s: f64 },
     #[error(
-        "the simulated rig diverges at {time_s:.3} s: {fault}; `residyn check` shows where to mend it"
+        "the simulated rig diverges at {time_s:.3} s: {fault}; `residyn check` shows what to fix"
     )]
     Mass { time_s: f64, fault: String },
 }
@@ -207,11 +207,13 @@ impl Plant {
         one_each("recording.start", self.recording.start.len(), 2 * n)?;
         let [low, high] = self.excitation.band_hz;
         if !(low > 0.0 && high > low) {
-            return Err("`excitation.band_hz` is two rising frequencies above zero".into());
+            return Err(
+                "`excitation.band_hz` must be two increasing frequencies above zero".into(),
+            );
         }
         let noise = [self.sensor.position_noise, self.sensor.position_step];
         if !noise.iter().all(|number| *number >= 0.0) {
-            return Err("noise and resolution of the sensors are not negative".into());
+            return Err("sensor noise and resolution must not be negative".into());
         }
         check_readings("sensor", noise)?;
         check_readings("excitation.band_hz", [high])?;
@@ -225,18 +227,18 @@ impl Plant {
             ("recording.logs", self.recording.logs, RUNS),
         ];
         if let Some((what, found, most)) = counts.iter().find(|(_, found, most)| found > most) {
-            return Err(format!("`{what}` is at most {most}, found {found}"));
+            return Err(format!("`{what}` must be at most {most}, found {found}"));
         }
         let [rate, duration] = [self.sensor.rate_hz, self.recording.duration_s];
         if !(rate > 0.0 && (2.0..LOG_ROWS as f64).contains(&(rate * duration))) {
             return Err(format!(
-                "`sensor.rate_hz` times `recording.duration_s` must give from two to {LOG_ROWS} rows, {rate:?} Hz for \
-                 {duration:?} s do not"
+                "`sensor.rate_hz` times `recording.duration_s` must give from two to {LOG_ROWS} rows; {rate:?} Hz \
+                 for {duration:?} s does not"
             ));
         }
         if duration > SIMULATED_S {
             return Err(format!(
-                "`recording.duration_s` is at most {SIMULATED_S:e} s, found {duration:?}"
+                "`recording.duration_s` must be at most {SIMULATED_S:e} s, found {duration:?}"
             ));
         }
         Ok(())

@@ -106,7 +106,7 @@ impl Sampling {
         let steps = self.trajectories.saturating_mul(self.length);
         if steps > SAMPLED_STEPS {
             return Err(format!(
-                "`trajectories` of `length` have {steps} steps in all; at most {SAMPLED_STEPS} are sampled"
+                "`trajectories` times `length` is {steps} steps; at most {SAMPLED_STEPS} are sampled"
             ));
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! Simulation: moving a model through time, in one place for fits, errors, simulated rigs and planners.
+//! Simulation: moving a model through time, shared by fits, errors, simulated rigs and planners.
 
 pub mod batch;
 mod command;

@@ -1,4 +1,4 @@
-//! How finely motion is integrated. All lengths in s.
+//! How finely motion is integrated; all step lengths in s.
 
 use crate::lanes::Row;
 

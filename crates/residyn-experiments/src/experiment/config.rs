@@ -81,26 +81,26 @@ impl Config {
         .into_iter()
         .chain(rounds);
         if let Some((name, found)) = counts.find(|(_, count)| !(1..=RUNS).contains(count)) {
-            return Err(format!("`{name}` is from 1 to {RUNS}, found {found}"));
+            return Err(format!("`{name}` must be from 1 to {RUNS}, found {found}"));
         }
         for (k, method) in self.method.iter().enumerate() {
             let name = &method.name;
             let sound = |c: char| c.is_ascii_alphanumeric() || c == '_';
             if name.is_empty() || !name.chars().all(sound) {
                 return Err(format!(
-                    "the name {name:?} of a method becomes the name of a folder; use letters, digits and _"
+                    "the method name {name:?} becomes a folder name; use letters, digits and _"
                 ));
             }
             if [super::PRIOR, super::PERFECT].contains(&name.as_str())
                 || self.method[..k].iter().any(|other| other.name == *name)
             {
                 return Err(format!(
-                    "the name `{name}` of a method is taken; choose another"
+                    "the method name `{name}` is already taken; choose another"
                 ));
             }
             if method.model.is_some() && method.checkpoint.is_some() {
                 return Err(format!(
-                    "method `{name}` has both `model` and `checkpoint`; its prior is one of them"
+                    "method `{name}` has both `model` and `checkpoint`; give one of them as its prior"
                 ));
             }
         }

@@ -8,7 +8,7 @@ use residyn_core::closeloop::StudyError;
 use residyn_core::model::FileError;
 use residyn_core::plant::PlantError;
 use residyn_io::runs::RunFolderError;
-use residyn_report::plot::PlotError;
+use residyn_plot::PlotError;
 use residyn_train::CheckpointError;
 use residyn_train::recipe::RecipeError;
 

@@ -1,5 +1,5 @@
 use super::{Course, PERFECT, PRIOR, Results};
-use residyn_report::plot::{
+use residyn_plot::{
     Course as Curve, LearningPanel, Method, MethodCurve, PlotError, Quantity, Scale, Spread,
     learning_curves,
 };

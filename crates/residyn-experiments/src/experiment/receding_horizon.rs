@@ -12,7 +12,7 @@ pub(super) fn check(session: &Session) -> Result<(), String> {
         )),
         some if some.iter().all(|steps| (1..=horizon).contains(steps)) => Ok(()),
         _ => Err(format!(
-            "`replan` lists numbers from 1 to {horizon}, the steps of a plan"
+            "`replan` must list numbers from 1 to {horizon}, the steps of a plan"
         )),
     }
 }

@@ -1,4 +1,4 @@
-//! The model description.
+//! The model description of an FMU.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;

@@ -1,4 +1,4 @@
-//! FMI: the model with its C code as a unit for other simulators, for model exchange and for co-simulation.
+//! FMI: the model with its C code as a unit (FMU) for other simulators, for model exchange and co-simulation.
 
 mod description;
 pub(super) mod fmi2;
@@ -86,14 +86,14 @@ fn predict(path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
 
 fn not_carried(model: &ExportModel) -> Vec<String> {
     let delay = delays(model).then(|| {
-        "the delay between steps of model exchange: there a delayed torque follows straight lines through the points \
-         that the importer accepted; co-simulation delays it exactly"
+        "the delay between steps of model exchange: there a delayed torque is interpolated linearly between the \
+         points that the importer accepted; co-simulation delays it exactly"
             .to_owned()
     });
     let binary = match compile(version()) {
         Ok(()) => None,
         Err(reason) => Some(format!(
-            "a binary: the FMU holds source code alone, since {reason}"
+            "a binary: the FMU holds only source code, since {reason}"
         )),
     };
     model

@@ -1,4 +1,4 @@
-//! Predicts from a description and its weights alone, as a client would that knows neither model files nor effects.
+//! Predicts from a description and its weights alone, like a client that knows neither model files nor effects.
 
 use std::path::{Path, PathBuf};
 

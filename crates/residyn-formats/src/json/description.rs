@@ -1,4 +1,4 @@
-//! The description: everything of a model but its learnable numbers.
+//! The description: a whole model except for its learnable numbers.
 
 use std::path::PathBuf;
 

@@ -42,19 +42,19 @@ pub enum ImportError {
         found: u64,
         by: String,
     },
-    #[error("{path}: the parameters of its model file are {file}, those of its weights {weights}; take another copy", path = .path.display())]
+    #[error("{path}: the parameters of its model file are {file}, those of its weights {weights}; use another copy", path = .path.display())]
     Foreign {
         path: PathBuf,
         file: String,
         weights: String,
     },
-    #[error("{path}: `joints` is {found}, its model file has {expected}; take another copy", path = .path.display())]
+    #[error("{path}: `joints` is {found}, its model file has {expected}; use another copy", path = .path.display())]
     Joints {
         path: PathBuf,
         found: usize,
         expected: usize,
     },
-    #[error("{path}: its weights are in {weights}, which is no file beside it but a link or in another folder; put the weights beside the description", path = .path.display(), weights = .weights.display())]
+    #[error("{path}: its weights are in {weights}, which is a link or in another folder; put the weights in a file next to the description", path = .path.display(), weights = .weights.display())]
     Elsewhere { path: PathBuf, weights: PathBuf },
     #[error(transparent)]
     Model(#[from] FileError),

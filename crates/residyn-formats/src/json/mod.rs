@@ -17,7 +17,7 @@ use residyn_core::model::weights::to_bytes;
 
 pub(super) const JSON: Format = Format {
     name: "json",
-    about: "the whole model as a description, its weights beside it as safetensors",
+    about: "the whole model as a description, with its weights next to it as safetensors",
     extension: DESCRIPTION,
     not_carried: |_| Vec::new(),
     files: |model, path| pair(model, path, &path.with_extension(WEIGHTS)),
@@ -28,7 +28,7 @@ pub(super) const JSON: Format = Format {
 
 pub(super) const SAFETENSORS: Format = Format {
     name: "safetensors",
-    about: "weights, the description of the whole model beside them as JSON",
+    about: "weights, with the description of the whole model next to them as JSON",
     extension: WEIGHTS,
     files: |model, path| pair(model, &path.with_extension(DESCRIPTION), path),
     client: Client::Own(|path, samples| {

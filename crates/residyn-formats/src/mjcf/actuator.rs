@@ -45,7 +45,7 @@ pub(super) fn drives<'s, 'x>(
             first.effort = None;
             continue;
         }
-        #[allow(clippy::float_cmp)] // as written
+        #[allow(clippy::float_cmp)] // compared as written
         if gear != 1.0 && servo.is_none() {
             drive.note(format!("`{name}` has the gear {gear}: tau is the torque or force at `{joint}`, {gear} times the control"));
         }
@@ -86,7 +86,7 @@ fn servo(drive: &Element<'_, '_>, kind: &str, gear: f64) -> Result<Option<Servo>
             let bias = [0, 1, 2].map(|place| number("biasprm", place));
             let [constant, by_position, by_velocity] =
                 bias.map(|value| value.map(|v| v.unwrap_or(0.0)));
-            #[allow(clippy::float_cmp)] // as written
+            #[allow(clippy::float_cmp)] // compared as written
             if constant? != 0.0 || by_position? != -gain {
                 return Ok(None);
             }
@@ -95,7 +95,7 @@ fn servo(drive: &Element<'_, '_>, kind: &str, gear: f64) -> Result<Option<Servo>
         _ => return Ok(None),
     };
     // The command is the position before the gear, and the gear scales the force once more.
-    #[allow(clippy::float_cmp)] // as written
+    #[allow(clippy::float_cmp)] // compared as written
     let is_direct = gear == 1.0;
     Ok(is_direct.then_some(Servo { stiffness, damping }))
 }
@@ -142,7 +142,7 @@ pub(super) fn symmetric(
     [low, high]: [f64; 2],
     key: &str,
 ) -> Option<f64> {
-    #[allow(clippy::float_cmp)] // as written
+    #[allow(clippy::float_cmp)] // compared as written
     if low == -high {
         return Some(high);
     }

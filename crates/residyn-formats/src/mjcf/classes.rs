@@ -1,4 +1,4 @@
-//! Default classes, which give elements attributes that they lack.
+//! Default classes, which supply attributes that elements lack.
 
 use std::collections::HashMap;
 
@@ -52,7 +52,7 @@ impl<'s, 'x> Classes<'s, 'x> {
         let all = || defaults.iter().flat_map(|default| elements(*default));
         if let Some(node) = all().nth(XML_DEFAULTS) {
             let message = format!(
-                "the default class `{name}` has more than {XML_DEFAULTS} elements, those around it included; give attributes where they hold"
+                "the default class `{name}` has more than {XML_DEFAULTS} elements, including those of the classes around it; give the attributes at the elements they apply to"
             );
             return Err(self.source.error(node, message));
         }

@@ -63,7 +63,7 @@ pub(super) fn inertia(
         "capsule" => capsule(side(0)?, half()?),
         other => {
             let message = format!(
-                "the inertia of a {other} is not worked out; give <inertial> in body `{body}`, such as MuJoCo's mj_saveLastXML writes with saveinertial=\"true\""
+                "the inertia of a {other} is not computed; give <inertial> in body `{body}`, such as MuJoCo's mj_saveLastXML writes with saveinertial=\"true\""
             );
             return Err(geom.error(message));
         }

@@ -1,4 +1,4 @@
-//! MJCF, the format of MuJoCo: read, written and written into.
+//! MJCF, the format of MuJoCo: reading, writing, and writing values into existing files.
 
 mod actuator;
 mod classes;

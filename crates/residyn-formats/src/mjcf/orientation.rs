@@ -19,7 +19,8 @@ impl Angles {
     pub fn new(compiler: &Element<'_, '_>) -> Result<Self, FileError> {
         let sequence = compiler.text("eulerseq").unwrap_or("xyz");
         if sequence.len() != 3 || !sequence.chars().all(|c| "xyzXYZ".contains(c)) {
-            let message = format!("`eulerseq` is three letters of xyzXYZ, found \"{sequence}\"");
+            let message =
+                format!("`eulerseq` must be three letters of xyzXYZ, found \"{sequence}\"");
             return Err(compiler.attribute_error("eulerseq", message));
         }
         Ok(Self {
@@ -49,7 +50,7 @@ impl Angles {
                 [] => {}
                 [way] => return self.given(&part, way),
                 [_, second, ..] => {
-                    let message = format!("`{second}` is a second orientation; give one");
+                    let message = format!("`{second}` is a second orientation; give only one");
                     return Err(part.attribute_error(second, message));
                 }
             }
@@ -63,7 +64,7 @@ impl Angles {
                 let [w, x, y, z] = element.numbers(way)?.unwrap_or([1.0, 0.0, 0.0, 0.0]);
                 let quaternion = Quaternion::new(w, x, y, z);
                 if quaternion.norm() < 1e-10 {
-                    return Err(element.attribute_error(way, "`quat` has no length"));
+                    return Err(element.attribute_error(way, "`quat` has zero length"));
                 }
                 Ok(UnitQuaternion::from_quaternion(quaternion)
                     .to_rotation_matrix()
@@ -73,7 +74,7 @@ impl Angles {
                 let [x, y, z, angle] = self.in_rad::<4>(element, way)?;
                 let axis = Vector3::new(x, y, z).try_normalize(1e-10);
                 axis.map(|axis| turn(axis, angle))
-                    .ok_or_else(|| element.attribute_error(way, "the axis has no length"))
+                    .ok_or_else(|| element.attribute_error(way, "the axis has zero length"))
             }
             "euler" => Ok(self.euler(self.in_rad::<3>(element, way)?)),
             "xyaxes" => {

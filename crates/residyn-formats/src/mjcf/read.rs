@@ -89,7 +89,7 @@ impl<'s, 'x> Reader<'s, 'x> {
         if compiler.text("coordinate") == Some("global") {
             compiler.refuse(
                 "coordinate",
-                "local coordinates are the only ones; convert the file with MuJoCo 2.3.3",
+                "only local coordinates are read; convert the file with MuJoCo 2.3.3",
             )?;
         }
         compiler.note_others(COMPILER);
@@ -155,7 +155,7 @@ impl<'s, 'x> Reader<'s, 'x> {
             if option.number_or(fluid, 0.0)? != 0.0 {
                 self.source.note(
                     self.root,
-                    format!("forces of the fluid (`{fluid}`) are not carried"),
+                    format!("fluid forces (`{fluid}`) are not carried"),
                 );
             }
         }
@@ -213,7 +213,7 @@ impl<'s, 'x> Reader<'s, 'x> {
         for part in elements(body) {
             let remedy = match part.tag_name().name() {
                 "inertial" | "joint" | "geom" | "body" | "site" | "camera" | "light" => continue,
-                "freejoint" => "a base that floats; remove it, which fixes the base",
+                "freejoint" => "a floating base; remove it, which fixes the base",
                 _ => {
                     "which is not read; save the compiled model with MuJoCo's mj_saveLastXML, or remove it"
                 }
@@ -231,7 +231,7 @@ impl<'s, 'x> Reader<'s, 'x> {
             "slide" => Ok(true),
             other => {
                 let message = format!(
-                    "joint `{name}` is of type `{other}`; known are hinge and slide: fix the joint, or describe it by several"
+                    "joint `{name}` is of type `{other}`; only hinge and slide are known: fix the joint, or describe it by several"
                 );
                 Err(joint.error(message))
             }
@@ -353,7 +353,7 @@ pub(super) fn linear(joint: &Element<'_, '_>, key: &str) -> Result<f64, FileErro
         || all.first().is_some_and(|first| *first < 0.0)
     {
         let message = format!(
-            "`{key}` is one number from zero on; a polynomial is not carried, give its linear part"
+            "`{key}` must be one number, zero or more; a polynomial is not carried, give its linear part"
         );
         return Err(joint.attribute_error(key, message));
     }

@@ -1,4 +1,4 @@
-//! Writes values into a file, and leaves all else in it as it is.
+//! Writes values into an existing file and leaves the rest of it unchanged.
 
 use std::path::Path;
 
@@ -66,7 +66,7 @@ fn write_inertia<'s>(
     added: &Inertia,
 ) -> Result<(), FileError> {
     if reader.inertia_from_geom == "true" {
-        let message = "`inertiafromgeom` takes every inertia from geoms; set it to \"auto\", which lets <inertial> prevail";
+        let message = "`inertiafromgeom` takes every inertia from geoms; set it to \"auto\", which gives <inertial> precedence";
         return Err(reader.source.error(of, message));
     }
     let class = reader.class_of(of);

@@ -26,7 +26,7 @@ pub(crate) const FORMAT: Format = Format {
     }),
     tolerance: 1e-9,
     robots: Some(RobotReader {
-        about: "up to twelve hinge or slide joints, one carrying the next",
+        about: "up to twelve hinge or slide joints in series",
         read: read_mjcf,
         root: "mujoco",
         effects: &["viscous_friction", "coulomb_friction", "rotor_inertia"],
@@ -141,7 +141,7 @@ fn of_joint(joint: &Joint) -> String {
 
 /// Attributes whose values differ from the format's defaults.
 fn attributes(values: &[(&str, f64, f64)]) -> String {
-    #[allow(clippy::float_cmp)] // as set
+    #[allow(clippy::float_cmp)] // compared as set
     let given = values.iter().filter(|(_, value, default)| value != default);
     given
         .map(|(key, value, _)| format!(" {key}=\"{value}\""))

@@ -1,5 +1,5 @@
-//! ONNX: the whole step as a graph, and the derivative as a second one in a file beside it. Rows of a batch are
-//! independent, everything is in single precision.
+//! ONNX: the whole step as a graph, and the derivative as a second graph in a separate file. Rows of a batch are
+//! independent; everything is in single precision.
 
 mod builder;
 mod derivative;
@@ -22,7 +22,7 @@ use residyn_core::expr::Op;
 
 pub(super) const FORMAT: Format = Format {
     name: "onnx",
-    about: "a step and, beside it, the derivative, as graphs of single precision with a free batch dimension",
+    about: "a step and the derivative, as two single-precision graphs with a free batch dimension",
     extension: "onnx",
     not_carried,
     files,
@@ -44,7 +44,7 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
     if !DiscreteFilter::all(model).is_empty() {
         let step = model.step_s;
         lost.push(format!(
-            "another step than {step} s: delay and lag are written for it; their memory is an input and an output"
+            "steps other than {step} s: delay and lag are written for it; their memory is an input and an output"
         ));
     }
     lost.extend(model.sensors_not_carried());

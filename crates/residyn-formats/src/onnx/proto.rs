@@ -1,4 +1,4 @@
-//! The fields in use of ONNX's protocol buffers.
+//! The fields of ONNX's protocol buffers that are in use.
 
 use prost::Message;
 

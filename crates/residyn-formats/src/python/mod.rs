@@ -1,5 +1,5 @@
-//! Python: one module that needs numpy alone, with the step, the derivative and the reward, and an environment of
-//! gymnasium if that is installed.
+//! Python: one module that needs only numpy, with the step, the derivative and the reward, and a gymnasium environment
+//! if gymnasium is installed.
 
 mod notation;
 
@@ -21,7 +21,7 @@ use residyn_core::sim::Scheme;
 
 pub(super) const FORMAT: Format = Format {
     name: "python",
-    about: "a module for numpy with the step, the derivative and the reward; an environment where gymnasium is installed",
+    about: "a numpy module with the step, the derivative and the reward; an environment if gymnasium is installed",
     extension: "py",
     not_carried,
     files,
@@ -43,13 +43,13 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
     let mut lost = Vec::new();
     if model.task.is_none() {
         lost.push(format!(
-            "a reward and an environment: no built-in task is one of `{}`",
+            "a reward and an environment: no built-in task is for `{}`",
             model.name()
         ));
     }
     if !DiscreteFilter::all(model).is_empty() {
         lost.push(format!(
-            "other values of delays and lags, and another step than {} s: they are written for these",
+            "other values of delays and lags, and steps other than {} s: the code is written for these",
             model.step_s
         ));
     }

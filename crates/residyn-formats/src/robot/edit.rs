@@ -1,4 +1,4 @@
-//! Changes of an XML file that leave everything else in it as it is.
+//! Edits to an XML file that leave the rest of it unchanged.
 
 use std::ops::Range;
 

@@ -104,7 +104,7 @@ impl<'s, 'x> Element<'s, 'x> {
                 *angle = meant;
             } else {
                 let message = format!(
-                    "`{key}`: {word} is taken as written; if {meant} is meant, that makes shorter equations"
+                    "`{key}`: {word} is taken as written; if {meant} is meant, writing it so makes shorter equations"
                 );
                 self.source.note(self.node(key), message);
             }
@@ -145,7 +145,7 @@ impl<'s, 'x> Element<'s, 'x> {
     pub fn direction(&self, key: &str, default: Vector3<f64>) -> Result<Vector3<f64>, FileError> {
         let given = self.numbers::<3>(key)?.map_or(default, Vector3::from);
         if given.norm() < 1e-10 {
-            let message = format!("`{key}` is a direction and has no length");
+            let message = format!("`{key}` is a direction but has zero length");
             return Err(self.attribute_error(key, message));
         }
         Ok(given.normalize())

@@ -1,5 +1,5 @@
-//! A model as simulators of rigid bodies can represent it: a mechanism with the same equations, and those effects that
-//! joints and drives have there.
+//! A model as rigid-body simulators can represent it: a mechanism with the same equations, and those effects that their
+//! joints and drives support.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -47,7 +47,7 @@ pub(crate) struct Link {
     pub tensor: Matrix3<f64>,
 }
 
-const DRY_FRICTION: &str = "dry friction that reverses smoothly: MuJoCo's frictionloss lets joints stick, and the comparison has the smooth form in its place";
+const DRY_FRICTION: &str = "dry friction that reverses smoothly: MuJoCo's frictionloss lets joints stick, so the comparison uses the smooth form instead";
 
 /// The schemes that MuJoCo has, and its names for them.
 const INTEGRATORS: [(&Scheme, &str); 2] = [(SEMI_IMPLICIT_EULER, "Euler"), (RK4, "RK4")];
@@ -107,7 +107,7 @@ impl Mechanism {
         if model.residual.is_some() {
             mechanism
                 .not_carried
-                .push("the network for what the equations lack".into());
+                .push("the network that learns what the equations lack".into());
         }
         mechanism.not_carried.extend(model.sensors_not_carried());
         let mut joints = mechanism.joints.iter();

@@ -1,4 +1,4 @@
-//! Shared by the formats of robot descriptions: elements of XML, the tree of bodies, and the mechanism with a model's
+//! Shared by the robot description formats: XML elements, the tree of bodies, and the mechanism with a model's
 //! equations.
 
 pub(super) mod edit;

@@ -1,4 +1,4 @@
-//! Drives as simulators have them: a torque that is linear in its command and its joint's motion, up to a limit.
+//! Drives as simulators model them: a torque that is linear in its command and its joint's motion, up to a limit.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -39,7 +39,7 @@ pub(super) fn servos(
         let is_same = servo.is_same(&torque, joints, j);
         is_same.then_some(servo).ok_or_else(|| {
             format!(
-                "the drive of joint {joint} is not linear in its command and its joint's motion up to a limit"
+                "the drive of joint {joint} is not a linear function of its command and its joint's motion, up to a limit"
             )
         })
     };
@@ -125,7 +125,7 @@ mod tests {
         ] {
             let error = servos(&drive(formula), 1, &[]).unwrap_err();
             assert!(
-                error.contains("the drive of joint 1 is not linear"),
+                error.contains("the drive of joint 1 is not a linear function"),
                 "{formula}"
             );
         }

@@ -96,7 +96,7 @@ pub(crate) fn chain(
     growth.link_followers()?;
     let Growth { joints, hinges, .. } = growth;
     if joints.is_empty() {
-        let message = "there is no joint that moves; give a mechanism of revolute, continuous or prismatic joints (hinge or slide in MJCF)";
+        let message = "no joint moves; give a mechanism of revolute, continuous or prismatic joints (hinge or slide in MJCF)";
         return Err(source.error_at(base.at, message));
     }
     if let Some(light) = without_inertia(&joints) {
@@ -239,7 +239,7 @@ impl<'t> Growth<'t, '_, '_> {
             let is_leader = |other: &&Hinge| other.name == mimics.leader && other.mimics.is_none();
             let Some(leader) = leaders.position(is_leader) else {
                 let message = format!(
-                    "joint `{}` follows `{}`, which is no joint of the chain that moves by itself; end the chain elsewhere, or fix the joint",
+                    "joint `{}` follows `{}`, which is not an independent joint of the chain; end the chain elsewhere, or fix the joint",
                     hinge.name, mimics.leader
                 );
                 let error = self.source.error_at(hinge.at, message);
@@ -294,7 +294,7 @@ pub(crate) fn check_inertia(
     }
     fault(tensor).map_or(Ok(()), |fault| {
         let message = format!(
-            "the inertia of `{body}` about its centre of mass {fault}, which no body has; correct it"
+            "the inertia of `{body}` about its centre of mass {fault}, which no physical body has; correct it"
         );
         Err(source.error_at(at, message))
     })

@@ -1,4 +1,4 @@
-//! A model's values in the robot description that it was made from.
+//! Writes a model's values back into the robot description that it was made from.
 
 use std::path::Path;
 
@@ -232,7 +232,7 @@ pub(crate) fn body(
         Some(fault) => {
             let name = link.attribute("name").unwrap_or_default();
             let message = format!(
-                "with the model's values the inertia of `{name}` {fault}, which no body has: the logs tell too little of it; fit to \
+                "with the model's values the inertia of `{name}` {fault}, which no physical body has: the logs do not determine it; fit to \
                  motion that moves it more"
             );
             Err(source.error(link, message))

@@ -1,4 +1,4 @@
-//! URDF, the format of ROS: read, written and written into.
+//! URDF, the format of ROS: reading, writing, and writing values into existing files.
 
 mod read;
 mod rewrite;

@@ -93,13 +93,13 @@ impl<'s, 'x> Robot<'s, 'x> {
         }
         let mut bases = named(self.root, "link").filter(|link| !children.contains(&link.id()));
         let Some(base) = bases.next() else {
-            let message = "no link is the root, which no joint has as its child; give one";
+            let message = "no link is the root, a link that is the child of no joint; give one";
             return Err(self.source.error(self.root, message));
         };
         match bases.next() {
             None => Ok(base),
             Some(other) => {
-                let message = "a second link that no joint has as its child; join it to the others";
+                let message = "a second link that is the child of no joint; join it to the others";
                 Err(self.source.error(other, message))
             }
         }
@@ -171,7 +171,7 @@ impl<'s, 'x> Robot<'s, 'x> {
             .find(|link| !hangs(link))
             .map_or(Ok(()), |link| {
                 let message =
-                    "this link does not hang on the root: its joints form a loop; open the loop";
+                    "this link is not connected to the root: its joints form a loop; open the loop";
                 Err(self.source.error(link, message))
             })
     }
@@ -228,7 +228,7 @@ impl<'s, 'x> Robot<'s, 'x> {
             "prismatic" => Ok(true),
             other => {
                 let message = format!(
-                    "joint `{name}` is of type `{other}`; known are fixed, revolute, continuous and prismatic: fix the joint, or describe it by several"
+                    "joint `{name}` is of type `{other}`; only fixed, revolute, continuous and prismatic are known: fix the joint, or describe it by several"
                 );
                 Err(element.attribute_error("type", message))
             }

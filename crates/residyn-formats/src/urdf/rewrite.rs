@@ -1,4 +1,4 @@
-//! Writes values into a file, and leaves all else in it as it is.
+//! Writes values into an existing file and leaves the rest of it unchanged.
 
 use std::path::Path;
 

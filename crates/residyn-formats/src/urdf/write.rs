@@ -26,7 +26,7 @@ pub(crate) const FORMAT: Format = Format {
     }),
     tolerance: 1e-9,
     robots: Some(RobotReader {
-        about: "up to twelve revolute, continuous or prismatic joints, one carrying the next",
+        about: "up to twelve revolute, continuous or prismatic joints in series",
         read: read_urdf,
         root: "robot",
         effects: &["viscous_friction", "coulomb_friction"],
@@ -44,7 +44,7 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
         return Vec::new();
     };
     let mut lost = mechanism.not_carried;
-    #[allow(clippy::float_cmp)] // as written
+    #[allow(clippy::float_cmp)] // compared as written
     if mechanism.gravity != GRAVITY {
         lost.push(format!(
             "gravity of {} m/s^2: only MuJoCo reads it",
@@ -62,7 +62,7 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
         lost(joint.drivetrain.spring.is_some(), "the spring");
         lost(drive.lag.is_some(), "the drive's lag");
         lost(drive.bias != [0.0; 3], "what the drive adds to its command");
-        #[allow(clippy::float_cmp)] // as set
+        #[allow(clippy::float_cmp)] // compared as set
         lost(drive.gain != 1.0 || drive.gear != 1.0, "the drive's gain");
     }
     lost

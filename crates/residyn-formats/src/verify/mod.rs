@@ -1,4 +1,4 @@
-//! Checks a written file: a client predicts from it at sample points, and the difference to the program's own
+//! Checks a written file: a client predicts from it at sample points, and the difference from the program's own
 //! predictions is measured.
 
 mod client;

@@ -38,7 +38,7 @@ impl Predictions {
             let mut rows = rows.iter().flatten();
             if let Some(k) = rows.position(|row| !is_finite(row)) {
                 return Err(ClientError::NotFinite(format!(
-                    "the model itself leaves the finite numbers in {what} from the state {:?} under {:?}",
+                    "the model itself is not finite in {what} from the state {:?} under {:?}",
                     samples.states[k], samples.torques[k]
                 )));
             }

@@ -1,4 +1,4 @@
-//! Elements and names that are too many for a parser that looks through all of them at each.
+//! Refuses XML with too many elements or names for the parser, which searches all of them at each one.
 
 use std::path::Path;
 
@@ -25,12 +25,12 @@ pub(super) fn check(path: &Path, text: &str) -> Result<(), FileError> {
         depth = (depth + tag.opens).saturating_sub(tag.closes);
         namespaces += tag.namespaces;
         if depth > XML_DEPTH {
-            let message = format!("lies within more than {XML_DEPTH} elements; flatten the file");
+            let message = format!("is nested in more than {XML_DEPTH} elements; flatten the file");
             return Err(crowded(start, message));
         }
         if tag.attributes.max(namespaces) > XML_ATTRIBUTES {
             let message = format!(
-                "more than {XML_ATTRIBUTES} attributes of an element, or names of namespaces; take out those that nothing reads"
+                "more than {XML_ATTRIBUTES} attributes in an element, or namespace names; remove those that nothing reads"
             );
             return Err(crowded(start, message));
         }
@@ -124,16 +124,12 @@ mod tests {
                 .starts_with("a.xml, line 204, column 2: more than 200")
         );
         let namespaces = many(&|k| format!("<a xmlns:b{k}='c'/>"));
-        assert!(
-            message(&namespaces)
-                .unwrap()
-                .contains("names of namespaces")
-        );
+        assert!(message(&namespaces).unwrap().contains("namespace names"));
         let deep = "<a b='/>'>".repeat(201);
         assert!(
             message(&deep)
                 .unwrap()
-                .contains("within more than 200 elements")
+                .contains("in more than 200 elements")
         );
         let flat = "<a><b/><![CDATA[<a>]]></a>".repeat(201);
         for sound in [

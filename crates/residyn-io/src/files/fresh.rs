@@ -1,5 +1,5 @@
-//! Files and folders that are not whole yet. Their names depend on those of what they become alone, so that whoever writes
-//! it again after a kill finds and removes what is left.
+//! Files and folders that are still incomplete. Their names follow from the final names alone, so that the next writer
+//! after a kill finds and removes what is left.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};

@@ -1,4 +1,4 @@
-//! Files by their names: written whole or not at all, found beside another file or embedded, told apart by their contents.
+//! Files: written completely or not at all, found next to another file or embedded, identified by their contents.
 
 mod fresh;
 mod hash;

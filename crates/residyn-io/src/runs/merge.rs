@@ -20,15 +20,15 @@ pub struct Lacking {
 /// Why parts cannot be merged. Nothing was written, unless the writing itself failed.
 #[derive(Debug, Error)]
 pub enum MergeError {
-    #[error("{path} is no part of a run: it has no {RECORD}", path = .path.display())]
+    #[error("{path} is not part of a run: it has no {RECORD}", path = .path.display())]
     NoPart { path: PathBuf },
-    #[error("{path} is not of the same run as {first}: {difference}", path = .path.display(), first = .first.display())]
+    #[error("{path} is not from the same run as {first}: {difference}", path = .path.display(), first = .first.display())]
     OtherRun {
         path: PathBuf,
         first: PathBuf,
         difference: String,
     },
-    #[error("{one} and {other} are two results of one piece of work", one = .one.display(), other = .other.display())]
+    #[error("{one} and {other} are two results of the same piece of work", one = .one.display(), other = .other.display())]
     TwoResults { one: PathBuf, other: PathBuf },
     #[error("{path} cannot be read: {source}", path = .path.display())]
     Read {
@@ -294,13 +294,13 @@ mod tests {
             ),
             (
                 of("e", "2/2", 40, "x", "2"),
-                "b.csv are two results of one piece of work",
+                "b.csv are two results of the same piece of work",
             ),
             (
                 parent.path().to_owned(),
-                "is no part of a run: it has no shard.json",
+                "is not part of a run: it has no shard.json",
             ),
-            (parent.path().join("none"), "is no part of a run"),
+            (parent.path().join("none"), "is not part of a run"),
         ];
         for (other, part) in cases {
             let message = message(other);

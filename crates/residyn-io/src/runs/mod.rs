@@ -1,5 +1,4 @@
-//! What a run has beside its work: a locked folder that it can be resumed from, and shards of
-//! a run, which are done apart and merged.
+//! Runs: a locked folder from which a run can be resumed, and shards of a run, which are run separately and merged.
 
 mod difference;
 mod folder;

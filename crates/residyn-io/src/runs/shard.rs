@@ -32,7 +32,7 @@ impl Shard {
 /// Why a text does not name a shard.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ShardError {
-    #[error("give two whole numbers as K/N, 3/8 say")]
+    #[error("give two whole numbers as K/N, such as 3/8")]
     Form,
     #[error("K is {number} and N is {of}; shards are counted from 1/N to N/N")]
     Number { number: usize, of: usize },

@@ -1,4 +1,5 @@
-//! How much may be made of a packed file: a small one may hold any number of bytes, and a byte may be a number.
+//! How much may be unpacked from a compressed file: a small file may hold any number of bytes, each of which may be a
+//! number.
 
 use std::io::{self, Read};
 

@@ -1,7 +1,8 @@
 //! Text tables: CSV and its relatives.
 //!
 //! Accepted silently: a byte order mark, CRLF line ends, spaces around cells, quoted cells and blank lines. Columns are
-//! separated by the character that separates the header's names; decimal commas are read unless that is a comma.
+//! separated by the character that separates the header's names; decimal commas are read unless the separator is a
+//! comma.
 //!
 //! A text is read row by row and may be larger than the memory: only the numbers of the columns asked for are kept.
 

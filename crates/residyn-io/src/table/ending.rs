@@ -1,5 +1,6 @@
-//! A Parquet file that its reader can trust: its end is an error, where the reader looks for what a damaged length claims beyond
-//! it, a byte at a time and up to 2^31 times; and what describes the file and its pages was passed over once before.
+//! A Parquet file that its reader can trust. Reading beyond the end is an error: the reader would search there for the
+//! bytes that a damaged length claims, one at a time, up to 2^31 times. The metadata of the file and its pages are
+//! checked before the reader sees them.
 
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read};

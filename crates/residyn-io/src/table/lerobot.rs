@@ -1,4 +1,4 @@
-//! Data sets of LeRobot, versions 2 and 3: a folder of many episodes in Parquet, of which one is a log.
+//! LeRobot data sets, versions 2 and 3: a folder of many episodes in Parquet, one of which is read as a log.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -109,7 +109,7 @@ impl Episode {
     }
 
     /// The number of the episode, among those of all rows.
-    #[allow(clippy::cast_precision_loss)] // there are fewer than 2^53
+    #[allow(clippy::cast_precision_loss)] // fewer than 2^53 episodes
     fn number(&self, episodes: &[f64]) -> Result<f64, LogError> {
         let last = episodes.iter().copied().fold(f64::NAN, f64::max);
         let set = self.set.display();
@@ -118,7 +118,7 @@ impl Episode {
             Some(number) => Err(self.fault(format!("there is no episode {number}: the last is {set}#{last}"))),
             None if episodes.iter().all(|episode| *episode == last) => Ok(last),
             None => Err(self.fault(format!(
-                "holds several episodes, up to {last}, and a log is one of them: name one, {set}#{last} for instance"
+                "holds several episodes, up to {last}, and a log is one episode: name one, such as {set}#{last}"
             ))),
         }
     }

@@ -1,5 +1,6 @@
-//! MATLAB's files of versions 5 to 7: data elements of type, size and bytes, packed with zlib or not. Read here, since of the
-//! crates that do it one prints what it does not know and passes over what is damaged, and the other is a serializer.
+//! MATLAB files, versions 5 to 7: data elements of type, size and bytes, with or without zlib compression. Parsed here
+//! because, of the available crates, one prints what it does not know and skips damaged data, and the other is a
+//! serializer.
 
 #![warn(clippy::indexing_slicing)]
 

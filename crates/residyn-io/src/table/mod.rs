@@ -1,4 +1,4 @@
-//! Files of logs, as named columns of numbers: one reader a format behind one function.
+//! Log files as named columns of numbers: one reader per format, behind one function.
 
 mod arrays;
 mod budget;
@@ -51,7 +51,7 @@ const FOREIGN: [(&[u8], &str); 7] = [
     ),
     (
         ZIP,
-        "an .npz that is packed once more is not read; unpack it: `gunzip run.npz.gz`",
+        "a gzipped .npz is not read; unpack it: `gunzip run.npz.gz`",
     ),
     (
         b"\x89HDF",
@@ -64,7 +64,7 @@ const FOREIGN: [(&[u8], &str); 7] = [
     ),
     (
         PARQUET,
-        "Parquet is not read by a program without the feature `parquet`, nor packed; build it with that, or convert it: \
+        "Parquet is read only unpacked, by a build with the feature `parquet`; use such a build, or convert it: \
          `python -c \"import pandas; pandas.read_parquet('run.parquet').to_csv('run.csv', index=False)\"`",
     ),
 ];

@@ -1,4 +1,4 @@
-//! In place of the readers of recordings, in a program without them.
+//! Stands in for the readers of recordings in a program built without them.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ pub(super) use self::{of_folder as of_bag, of_folder as of_mcap};
 pub(super) fn of_folder(path: &Path, _: &Columns) -> Result<Arrays, LogError> {
     Err(LogError::Form {
         path: path.to_owned(),
-        fault: "folders and recordings of ROS are not read by a program without the feature `recordings`; build it with that, \
+        fault: "ROS folders and recordings are read only by a build with the feature `recordings`; use such a build, \
                 or write the log as CSV"
             .to_owned(),
     })

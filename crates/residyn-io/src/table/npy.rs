@@ -1,5 +1,5 @@
-//! NumPy arrays (format versions 1 to 3, numpy.lib.format): a dictionary of three Python literals, then the numbers. Read here,
-//! since the crates that do it bring a parser generator and C code for those three.
+//! NumPy arrays (format versions 1 to 3, numpy.lib.format): a dictionary of three Python literals, then the numbers.
+//! Parsed here because the available crates bring a parser generator and C code for those three literals.
 
 #![warn(clippy::indexing_slicing)]
 
@@ -61,7 +61,7 @@ impl<R: Read> Array<R> {
     ///
     /// # Errors
     /// An array that holds something else, has too many columns or numbers, or is cut off.
-    #[allow(clippy::cast_precision_loss)] // integers of loggers are far below 2^53
+    #[allow(clippy::cast_precision_loss)] // logged integers are far below 2^53
     pub fn columns(self, name: &str, budget: &mut Budget) -> Result<Vec<Vec<f64>>, String> {
         if self.is_text() || !(1..=2).contains(&self.shape.len()) {
             return Ok(Vec::new());

@@ -1,4 +1,5 @@
-//! NumPy's `.npz`: arrays of numbers by name, a column each; of `q`, `qd` and the like with a row a sample, a column a joint.
+//! NumPy's `.npz`: named arrays of numbers, one column each; arrays such as `q` and `qd` may have one row per sample
+//! and one column per joint.
 
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
@@ -34,7 +35,7 @@ fn table(packed: u64, archive: impl Read + Seek) -> Result<Arrays, String> {
         let name = file.name().map_err(|why| broken(&why))?.into_owned();
         if let Some(name) = name.strip_suffix(".npy") {
             let array = Array::of(file).ok_or_else(|| {
-                format!("array {name:?} is no NumPy array; write it again with numpy.savez")
+                format!("array {name:?} is not a NumPy array; write it again with numpy.savez")
             })?;
             unpacked.add(name, array)?;
         }
@@ -43,5 +44,5 @@ fn table(packed: u64, archive: impl Read + Seek) -> Result<Arrays, String> {
 }
 
 fn broken(why: &dyn std::fmt::Display) -> String {
-    format!("is no whole .npz file: {why}; write it again with numpy.savez")
+    format!("is not a complete .npz file: {why}; write it again with numpy.savez")
 }

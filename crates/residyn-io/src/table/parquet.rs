@@ -1,4 +1,5 @@
-//! Parquet: a column of numbers is a column; one of lists of numbers is as many as a list is long, `name1`, `name2` ..
+//! Parquet: a column of numbers becomes one column; a column of lists becomes one column per list entry, `name1`,
+//! `name2` ..
 
 use std::path::Path;
 use std::sync::Arc;
@@ -57,7 +58,7 @@ impl List {
         add_numbers(first, &mut row);
         if row.len() > LOG_COLUMNS {
             let message = format!(
-                "{name:?} has {} numbers a row, and at most {LOG_COLUMNS} columns are read",
+                "{name:?} has {} numbers per row, but at most {LOG_COLUMNS} columns are read",
                 row.len()
             );
             return Err(ParquetError::General(message));
@@ -82,7 +83,7 @@ impl List {
             Some((row, length)) => Err(LogError::Form {
                 path: path.to_owned(),
                 fault: format!(
-                    "row {} of {:?} has {length} number(s) where the first has {width}; write as many in all",
+                    "row {} of {:?} has {length} number(s) but the first has {width}; write the same number in every row",
                     row + 1,
                     self.name,
                 ),
@@ -139,7 +140,7 @@ impl List {
 pub(super) fn lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>, LogError> {
     let damaged = |why: String| LogError::Form {
         path: path.to_owned(),
-        fault: format!("is no whole Parquet file: {why}; write it again"),
+        fault: format!("is not a complete Parquet file: {why}; write it again"),
     };
     read_lists(path, is_wanted).map_err(|why| damaged(why.to_string()))
 }
@@ -212,7 +213,7 @@ fn add_numbers(field: &Field, numbers: &mut Vec<f64>) {
     }
 }
 
-#[allow(clippy::cast_precision_loss)] // integers of loggers are far below 2^53
+#[allow(clippy::cast_precision_loss)] // logged integers are far below 2^53
 fn number(field: &Field) -> Option<f64> {
     match *field {
         Field::Null => Some(f64::NAN),

@@ -1,4 +1,4 @@
-//! A file that is read from its beginning as often as it is needed, and never at once.
+//! A file that is read from its beginning as often as needed, and never all at once.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};

@@ -1,5 +1,5 @@
-//! Thrift's compact protocol, as far as to pass over what describes a Parquet file before its reader does: that one takes a step
-//! for each boolean of a list, which has no bytes, as often as the list claims.
+//! Thrift's compact protocol, just enough to skip a Parquet file's metadata before its reader parses it: the reader
+//! takes one step for each boolean of a list, for as many as the list claims, although they occupy no bytes.
 
 use std::io::{self, Error, Read};
 
@@ -46,7 +46,7 @@ fn value(bytes: &mut impl Read, kind: u8, depth: u8) -> io::Result<()> {
         },
         12 => structure(bytes, depth),
         13 => skip(bytes, 16),
-        _ => Err(damaged("of no known kind")),
+        _ => Err(damaged("of an unknown kind")),
     }
 }
 
@@ -93,7 +93,7 @@ fn whole(bytes: &mut impl Read) -> io::Result<u64> {
             return Ok(number);
         }
     }
-    Err(damaged("a number without an end"))
+    Err(damaged("a number that does not end"))
 }
 
 fn skip(bytes: &mut impl Read, count: u64) -> io::Result<()> {
@@ -124,7 +124,7 @@ mod tests {
         assert!(refused(&of_both).contains("too many booleans"));
         assert!(refused(&[0x1c; 100]).contains("too deep"));
         assert!(refused(&[0x15; 1]).contains("fill whole buffer"));
-        assert!(refused(&[0x1f, 0]).contains("no known kind"));
-        assert!(refused(&[[0x15].as_slice(), &[0xff; 11]].concat()).contains("without an end"));
+        assert!(refused(&[0x1f, 0]).contains("unknown kind"));
+        assert!(refused(&[[0x15].as_slice(), &[0xff; 11]].concat()).contains("does not end"));
     }
 }

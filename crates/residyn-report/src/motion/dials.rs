@@ -1,4 +1,4 @@
-//! Joints by themselves, where nothing is known of how they are joined: hands of dials, marks on rails.
+//! Joints drawn separately, if it is not known how they are connected: hands of dials, marks on rails.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,4 @@
-//! The links of a mechanism, seen from the side from which their motion shows most.
+//! The links of a mechanism, seen from the side that shows most of their motion.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -84,7 +84,7 @@ fn points(links: &[Joint], q: &[f64]) -> Vec<Vector3<f64>> {
 /// The directions to the right and upwards when points are viewed along the direction in which they spread least.
 fn view(seen: &[Vec<Vector3<f64>>]) -> [Vector3<f64>; 2] {
     let all = || seen.iter().flatten();
-    #[allow(clippy::cast_precision_loss)] // thousands
+    #[allow(clippy::cast_precision_loss)] // thousands of points
     let count = all().count().max(1) as f64;
     let middle = all().sum::<Vector3<f64>>() / count;
     let products = all().map(|point| (point - middle) * (point - middle).transpose());

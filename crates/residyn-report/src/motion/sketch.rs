@@ -1,4 +1,4 @@
-//! Lines that move, as texts that a page puts into its picture.
+//! Moving lines, as text that a page puts into its picture.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Which number to trust: each parameter by log, and what is fitted to one log judged by the others.
+//! Which number to trust: each parameter by log, and the fit to each log judged by the other logs.
 
 use maud::{Markup, html};
 

@@ -1,4 +1,4 @@
-//! Formulas, as browsers set them.
+//! Formulas as browsers typeset them.
 
 use maud::{Markup, PreEscaped, html};
 use pulldown_latex::{Parser, RenderConfig, Storage, config::DisplayMode, push_mathml};

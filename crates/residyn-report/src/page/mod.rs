@@ -1,5 +1,5 @@
-//! `report.html`: the report for a browser, made from `report.json` alone, and the results of experiments and of the bench. One
-//! file that needs no network, in the order of a reader's questions.
+//! `report.html`: the report for a browser, made from `report.json` alone; also the results of experiments and of the
+//! bench. A single file that needs no network, in the order of a reader's questions.
 
 mod better;
 mod calibration;
@@ -15,7 +15,7 @@ mod trust;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-pub use results::{ResultsPage, Share};
+pub use results::ResultsPage;
 
 use super::schema::Report;
 use super::wording::capitalised;

@@ -12,6 +12,7 @@ use crate::json::PAGE;
 use crate::wording::capitalised;
 use residyn_core::model::Call;
 use residyn_io::runs::{RunFolder, RunFolderError};
+use residyn_plot::Share;
 
 /// The page of an experiment or of the bench.
 pub struct ResultsPage<'a> {
@@ -30,13 +31,6 @@ pub struct ResultsPage<'a> {
     /// As resolved.
     pub configuration: &'a Value,
     pub call: &'a Call,
-}
-
-/// A relative frequency with its 95 % interval.
-pub struct Share {
-    pub what: String,
-    pub share: f64,
-    pub interval: [f64; 2],
 }
 
 impl ResultsPage<'_> {

@@ -1,4 +1,4 @@
-//! Pictures: places that the script fills from the data in the page.
+//! Pictures: placeholders that the script fills from the data in the page.
 
 use maud::{Markup, html};
 

@@ -1,4 +1,4 @@
-//! Whether the answer is to be trusted: what else explains the logs, what they leave open, and what is wrong with them.
+//! Whether the answer can be trusted: what else explains the logs, what they leave open, and what is wrong with them.
 
 use maud::{Markup, html};
 

@@ -1,4 +1,4 @@
-//! How much better: errors on the test logs, one row a joint.
+//! How much better: errors on the test logs, one row per joint.
 
 use super::{listed, paragraph};
 use crate::accuracy::{fitted_tests, is_some_reduction, position_unit};

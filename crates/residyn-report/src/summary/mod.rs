@@ -1,5 +1,5 @@
-//! The answer for a terminal, in some thirty lines of eighty characters: the story of `report.html`, question by question.
-//! Sentences are wrapped and never cut; long lists show their first entries.
+//! The answer for a terminal, in about thirty lines of eighty characters: the story of `report.html`, question by
+//! question. Sentences are wrapped and never cut; long lists show their first entries.
 
 mod better;
 mod curves;

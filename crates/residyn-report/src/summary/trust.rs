@@ -1,4 +1,4 @@
-//! Whether the answer is to be trusted, in a few lines.
+//! Whether the answer can be trusted, in a few lines.
 
 use super::paragraph;
 use crate::calibration;

@@ -1,4 +1,5 @@
-//! The reverse sweep: the derivatives of the sums by all learnable numbers, from the record of the forward sweep.
+//! The reverse sweep: the derivatives of the sums with respect to all learnable numbers, from the record of the forward
+//! sweep.
 
 use pulp::Simd;
 

@@ -1,5 +1,5 @@
-//! The learnable numbers of a model as one tensor, by one operation of Burn's graph: a reshape of each tensor and their
-//! concatenation would be some forty, each of which takes longer than the numbers take to copy.
+//! The learnable numbers of a model as one tensor, joined by one operation of Burn's graph: reshaping and concatenating
+//! the tensors would take some forty, each slower than copying the numbers.
 
 // `train::Backend` explains the choice of backend.
 #![allow(deprecated)]

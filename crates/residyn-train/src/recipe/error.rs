@@ -26,7 +26,7 @@ pub enum RecipeError {
         path: PathBuf,
         source: SegmentsError,
     },
-    #[error("{path}: `model` is not what the checkpoint holds: {source}", path = .path.display())]
+    #[error("{path}: `model` does not match the checkpoint: {source}", path = .path.display())]
     OtherModel {
         path: PathBuf,
         source: Box<CheckpointError>,

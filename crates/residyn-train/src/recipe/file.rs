@@ -145,7 +145,7 @@ impl Recipe {
     fn check(&self) -> Result<(), String> {
         if self.kind == Kind::Physics && self.network.is_some() {
             return Err(
-                "[network] is given, but kind = \"physics\" has no network; remove it, or take kind = \
+                "[network] is given, but kind = \"physics\" has no network; remove it, or use kind = \
                  \"hybrid\""
                     .into(),
             );
@@ -153,8 +153,8 @@ impl Recipe {
         let given = !self.start.is_empty() || !self.hold.is_empty();
         if self.kind == Kind::DataDriven && given {
             return Err(
-                "[start] and `hold` are about physical parameters, but kind = \"data_driven\" has none; \
-                 remove them, or take kind = \"hybrid\""
+                "[start] and `hold` concern physical parameters, but kind = \"data_driven\" has none; remove them, \
+                 or use kind = \"hybrid\""
                     .into(),
             );
         }
@@ -183,7 +183,7 @@ impl Recipe {
         known.iter().position(|k| *k == name).ok_or_else(|| {
             let near = suggestion(name, known.iter().copied());
             self.wrong(format!(
-                "{place} names `{name}`, which is no parameter of {}{near}; it has {}",
+                "{place} names `{name}`, which is not a parameter of {}{near}; it has {}",
                 dynamics.name,
                 known.join(", ")
             ))

@@ -30,15 +30,15 @@ impl Job {
         };
         match (recipe.kind, recipe.fit.penalty) {
             (Kind::Physics, _) => Err(recipe.wrong(
-                "kind = \"physics\" has no network, so that all models of a sweep would be the same; take kind = \
+                "kind = \"physics\" has no network, so all models of a sweep would be the same; use kind = \
                  \"hybrid\", or train one model"
                     .into(),
             )),
             (Kind::DataDriven, _) if with_alpha => Err(no_alpha(
-                "alpha weighs the residual, and kind = \"data_driven\" has none; take kind = \"hybrid\"",
+                "alpha weights the residual, but kind = \"data_driven\" has none; use kind = \"hybrid\"",
             )),
             (_, Penalty::Adaptive { .. }) if with_alpha => Err(no_alpha(
-                "[fit] has the adaptive penalty, which finds its weight itself; take penalty = \
+                "[fit] has the adaptive penalty, which finds its own weight; use penalty = \
                  { fixed = { alpha = 1e-4 } }",
             )),
             _ => Ok(()),

@@ -118,7 +118,7 @@ fn kind_of(checkpoint: &Checkpoint) -> Kind {
 
 fn other_kind(recipe: &Recipe, asked: Kind, saved: Kind) -> RecipeError {
     recipe.wrong(format!(
-        "kind = \"{}\", but the checkpoint holds a model of kind \"{}\"; take that, or \"hybrid\"",
+        "kind = \"{}\", but the checkpoint holds a model of kind \"{}\"; use that, or \"hybrid\"",
         asked.name(),
         saved.name()
     ))

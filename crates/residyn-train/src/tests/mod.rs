@@ -1,4 +1,4 @@
-//! Tests of training on a simulated pendulum, whose parts they share.
+//! Tests of training on a simulated pendulum, and the parts that they share.
 
 mod checkpoints;
 mod environment;

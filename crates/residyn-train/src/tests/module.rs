@@ -1,4 +1,4 @@
-//! The hybrid model as a module of Burn's.
+//! The hybrid model as a Burn module.
 
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::optim::{GradientsParams, SgdConfig};

@@ -66,7 +66,7 @@ fn what_has_no_decoupled_decay_says_so() {
         );
         if let Err(error) = made {
             assert!(
-                error.to_string().contains("take adam, adan, lamb or lion"),
+                error.to_string().contains("use adam, adan, lamb or lion"),
                 "{error}"
             );
         }

@@ -177,8 +177,8 @@ fn networks_of_another_shape_are_refused() {
     assert_eq!(
         message,
         "a network with layer widths [3, 16, 16, 16, 1] does not fit 2 joints: it must begin with 6 \
-         features, end with 2 outputs and have no empty layer; change `hidden`, or take the network that \
-         was trained for this system"
+         features, end with 2 outputs and have no empty layer; change `hidden`, or use the network that was \
+         trained for this system"
     );
     let mut dynamics = pendulum(15.0, 3.0);
     dynamics.parameters[1].scale = 0.0;

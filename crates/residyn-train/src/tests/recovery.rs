@@ -128,7 +128,7 @@ fn a_diverging_loss_stops_the_run_with_epoch_and_remedy() {
     assert_eq!(
         error.unwrap_err().to_string(),
         "the loss became inf in epoch 0, with C_g = 8.000000, C_i = 2.000000; look for outliers or wrong \
-         units in the data, lower the learning rates, or take shorter segments or a finer integrator"
+         units in the data, lower the learning rates, or use shorter segments or a finer integrator"
     );
 }
 

@@ -1,4 +1,4 @@
-//! Weight decay, and learning rates that fall.
+//! Weight decay and decreasing learning rates.
 
 use super::{fit, hybrid, rng, transitions};
 use crate::{Backend, FitSettings, HybridModel, LearningRates, Training};

@@ -1,5 +1,5 @@
-//! Stage 10: what some logs can show: how often the search names an effect where there is none, and how small an effect
-//! it would name.
+//! Stage 10: what the logs can show: how often the search names an absent effect, and how small an effect it would
+//! name.
 
 mod detection_limit;
 mod simulated_logs;

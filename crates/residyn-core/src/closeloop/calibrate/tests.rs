@@ -1,4 +1,4 @@
-//! On a simulated pendulum without a missing effect, encoders as on a real rig.
+//! Tests on a simulated pendulum without a missing effect, with encoders as on a real rig.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

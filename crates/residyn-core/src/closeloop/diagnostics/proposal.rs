@@ -174,7 +174,7 @@ fn file(terms: &[Term], magnitudes: &[f64]) -> String {
         .map(|((term, _), k)| format!("c_{k}*{term}"))
         .collect();
     let mut text = format!(
-        "[effect]\nname = \"proposed\"\nabout = \"a formula that fits what was left; no finding\"\n\
+        "[effect]\nname = \"proposed\"\nabout = \"a formula fitted to the residual; not a finding\"\n\
          force = \"{}\"\n\n[parameters]\n",
         sum.join(" + ")
     );

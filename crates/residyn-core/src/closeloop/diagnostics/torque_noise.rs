@@ -1,4 +1,4 @@
-//! What the sensors' noise does to the torques that a logged motion needs.
+//! How the sensors' noise changes the torques that a logged motion needs.
 
 use nalgebra::DVector;
 use rand::Rng;

@@ -22,13 +22,11 @@ pub struct Alternative {
 /// Why no experiment was simulated against an alternative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum NotSimulated {
-    #[error("not simulated: others do as well and come first")]
+    #[error("not simulated: other alternatives rank higher")]
     Rank,
-    #[error("not simulated: a model diverges on the present motion")]
+    #[error("not simulated: a model diverges on the logged motion")]
     Diverged,
-    #[error(
-        "not simulated: the torques were compared, and the motion is what the controller makes of it"
-    )]
+    #[error("not simulated: torques were compared, and the controller dictates the motion")]
     Torques,
 }
 
@@ -66,8 +64,8 @@ impl Alternative {
             format!("contains {chosen} and explains these logs no better")
         } else {
             format!(
-                "not separable from {chosen} on these logs: beside the other effects it cuts the left-out loss by {:.1} %, \
-                 that one by {:.1} %",
+                "not separable from {chosen} on these logs: together with the other effects it cuts the left-out loss \
+                 by {:.1} %, {chosen} by {:.1} %",
                 100.0 * rival.gain,
                 100.0 * rival.gain_of_chosen
             )

@@ -92,13 +92,18 @@ const MENU: [MenuItem; 12] = [
     logged("half the {driving}", 0.5, 1.0, 0.5),
     logged("double the {driving}", 2.0, 1.0, 2.0),
     logged(
-        "the same {driving} run three times as slowly",
+        "the same {driving} profile at a third of the speed",
         1.0,
         1.0 / 3.0,
         1.0 / 3.0,
     ),
-    logged("the same {driving} run twice as fast", 1.0, 2.0, 1.0),
-    logged("the {driving}'s sign reversed", -1.0, 1.0, -1.0),
+    logged(
+        "the same {driving} profile at twice the speed",
+        1.0,
+        2.0,
+        1.0,
+    ),
+    logged("the {driving} with its sign reversed", -1.0, 1.0, -1.0),
     MenuItem {
         text: "slow {driving} ramps on joint {joint} from standstill to {size}, up and down",
         drive: Drive::Ramps(0.5),
@@ -114,11 +119,11 @@ const MENU: [MenuItem; 12] = [
         2.0,
     ),
     turning(
-        "full turns of joint {joint}, by a constant {size} added to its {driving}",
+        "full turns of joint {joint}, with a constant {size} added to its {driving}",
         1.0,
     ),
     turning(
-        "full turns of joint {joint}, by a constant {size} added to its {driving}",
+        "full turns of joint {joint}, with a constant {size} added to its {driving}",
         2.0,
     ),
 ];

@@ -1,4 +1,4 @@
-//! Stage 6: the experiment that tells apart two explanations that the logs do not.
+//! Stage 6: the experiment that distinguishes two explanations between which the logs cannot decide.
 
 mod alternative;
 mod comparison;

@@ -80,13 +80,13 @@ impl Separation {
         match (&self.experiment, self.seconds) {
             (Some(experiment), Some(seconds)) => format!(
                 "{experiment}; the two then differ by {difference} {unit} on joint {} (rms over half a second, after \
-                 refitting; in these logs {}, noise {noise}), and {seconds:.0} s are enough",
+                 refitting; in these logs {}, noise {noise}), and {seconds:.0} s of data suffice",
                 self.joint,
                 milli(self.present_difference_rad)
             ),
             _ => format!(
-                "no change of torque, speed, load or duration that was simulated separates them (largest difference \
-                 {difference} {unit}, noise {noise}): for this rig they are the same; fix one by an independent \
+                "no simulated change of torque, speed, load or duration separates them (largest difference \
+                 {difference} {unit}, noise {noise}): on this rig they are equivalent; determine one by an independent \
                  measurement"
             ),
         }

@@ -252,7 +252,7 @@ fn together(
         clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss
-    )] // at most the root of 2^28
+    )] // at most the square root of 2^28
     let values = (problem.settings.select.most_numbers as f64 / equations as f64).sqrt() as usize;
     let room = values.saturating_sub(fitted.fit.columns.len());
     let switches = |option: &FittedEffect| {

@@ -222,7 +222,7 @@ impl<'a> Search<'a> {
         let problem = self.problem;
         let step = problem.settings.select.round_gain;
         let best = self.better(&declared, step, |search, declared| {
-            search.say("fitting what most machines have");
+            search.say("fitting baseline friction");
             let baseline = baseline_sets(problem);
             let fitted = search.fitted_for_the_best(declared, baseline);
             search.noted(declared, fitted, 0)

@@ -1,4 +1,4 @@
-//! Sets are compared before they are fitted, on a simulated pendulum with dry friction.
+//! Tests on a simulated pendulum with dry friction: sets are compared before they are fitted.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,4 +1,4 @@
-//! One column of a log by itself.
+//! The audit of one column of a log on its own.
 
 use serde::Serialize;
 

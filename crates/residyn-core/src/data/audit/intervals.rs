@@ -1,4 +1,4 @@
-//! Where in a log something is so.
+//! The intervals that certain rows of a log form.
 
 use crate::data::log::{Interval, Log};
 

@@ -1,4 +1,4 @@
-//! The motion of one joint as its angles tell it.
+//! The motion of one joint, derived from its angles.
 
 use std::ops::Range;
 

@@ -151,13 +151,13 @@ impl Finding {
         }
     }
 
-    /// Where it is in the log, `t = 2 to 3.2 s, 5 to 6 s and shorter`; `None` if it concerns the whole log.
+    /// Where it is in the log, `t = 2 to 3.2 s, 5 to 6 s and shorter ones`; `None` if it concerns the whole log.
     pub(super) fn place(&self) -> Option<String> {
         let message = longest(self.spans_s.clone(), TOLD_SPANS);
         let span = |[start, end]: &[f64; 2]| format!("{} to {} s", seconds(*start), seconds(*end));
         let text = message.iter().map(span).collect::<Vec<_>>().join(", ");
         let more = match self.spans_s.len() > message.len() {
-            true => " and shorter",
+            true => " and shorter ones",
             false => "",
         };
         (!message.is_empty()).then(|| format!("t = {text}{more}"))

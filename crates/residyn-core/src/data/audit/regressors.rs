@@ -1,4 +1,4 @@
-//! What a joint's motion can need torque for, as columns of a linear regression.
+//! The terms for which a joint's motion may need torque, as columns of a linear regression.
 
 use super::motion::Motion;
 use crate::data::Joint;

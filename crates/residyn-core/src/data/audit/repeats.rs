@@ -68,13 +68,14 @@ fn repeated(before: &[&Log], log: &Log) -> Option<Repeated> {
 fn finding(name: &str, repeated: &Repeated) -> Finding {
     if repeated.is_identical() {
         let text = format!(
-            "every angle is that of {name}: this is the same log once more, and no test of what was fitted to the other"
+            "every angle equals that of {name}: this is the same log again, and it cannot test a model fitted to the \
+             other"
         );
         return Finding::new(Severity::Serious, text);
     }
     let text = format!(
-        "the motion is that of {name} once more (the angles differ by {} % of it): one of the two as a test of the other tells \
-         how well torques repeat, and nothing of other motions",
+        "the motion repeats that of {name} (the angles differ by {} % of it): as a test of the other, either log shows \
+         how well torques repeat, and nothing about other motions",
         short(100.0 * repeated.share)
     );
     Finding::new(Severity::Warning, text)
@@ -156,12 +157,12 @@ mod tests {
             let says = |audit: &Audit| audit.findings.iter().any(|f| f.text.contains(words));
             audits.iter().map(says).collect()
         };
-        let repeats = message("the motion is that of a.csv once more");
+        let repeats = message("the motion repeats that of a.csv");
         assert_eq!(repeats, [false, true, false, false, false, false]);
-        let is_same = message("every angle is that of c.csv");
+        let is_same = message("every angle equals that of c.csv");
         assert_eq!(is_same, [false, false, false, false, true, false]);
         // If one log moves alike and another is identical, the latter is named.
-        let is_same = message("every angle is that of b.csv");
+        let is_same = message("every angle equals that of b.csv");
         assert_eq!(is_same, [false, false, false, false, false, true]);
         let places = repeated
             .iter()

@@ -1,4 +1,4 @@
-//! How the acceleration of a joint answers to its torque and its motion.
+//! How the acceleration of a joint responds to its torque and its motion.
 
 use serde::Serialize;
 

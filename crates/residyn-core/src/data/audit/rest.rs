@@ -1,4 +1,4 @@
-//! Joints that rest: nothing is learned of one that rests in all logs that are used together.
+//! Joints at rest: nothing can be learned about a joint that rests in all logs that are used together.
 
 use super::joint::VISIBLE_STEPS;
 use super::quality::{Audit, Finding, Severity};
@@ -23,11 +23,12 @@ pub(super) fn report_rest(audits: &mut [Audit]) {
 
 fn finding(joint: Joint, range: f64, is_moved_by_others: bool) -> Finding {
     let (severity, therefore) = match is_moved_by_others {
-        true => (Severity::Info, "the other logs tell its parameters"),
-        false => (Severity::Serious, "nothing tells its parameters"),
+        true => (Severity::Info, "its parameters come from the other logs"),
+        false => (Severity::Serious, "its parameters cannot be identified"),
     };
     let text = format!(
-        "joint {joint} moves by {} rad, less than {VISIBLE_STEPS} resolution steps or noise deviations: {therefore}",
+        "joint {joint} moves by {} rad, less than {VISIBLE_STEPS} resolution steps or standard deviations of the \
+         noise: {therefore}",
         short(range)
     );
     Finding::new(severity, text).of(joint)

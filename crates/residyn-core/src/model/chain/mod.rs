@@ -1,10 +1,10 @@
-//! The mechanics of a serial chain of bodies: from a [`Chain`] to a model file ([`model_text`]), and back for a few kinds of
-//! mechanism (`recover`).
+//! The mechanics of a serial chain of bodies: from a [`Chain`] to a model file ([`model_text`]), and back for a few
+//! kinds of mechanism (`recover`).
 //!
-//! A long chain is written as its bodies; its equations are then written as operations ([`Links`]). A short one is written
-//! in closed form: each entry of the mass matrix is linear in the physical parameters, with Fourier series in the angles as
-//! coefficients. In this form equal functions look the same, so that parameters which the motion determines only in
-//! combination are found and lumped (base parameters).
+//! A long chain is written as its bodies; its equations are then written as operations ([`Links`]). A short one is
+//! written in closed form: each entry of the mass matrix is linear in the physical parameters, with Fourier series in
+//! the angles as coefficients. In this form equal functions look the same, so that parameters which the motion
+//! determines only in combination are found and lumped (base parameters).
 
 mod base;
 mod bodies_text;

@@ -1,4 +1,4 @@
-//! The bodies nearest to given ones with given sums of their parameters.
+//! The bodies nearest to given ones, subject to given sums of their parameters.
 //!
 //! A body is possible if its pseudo-inertia, the matrix of the second moments of its mass over (x, y, z, 1), is
 //! positive definite. The distance between two bodies is the log-determinant Bregman divergence of these matrices,

@@ -1,5 +1,6 @@
-//! Dynamics of a chain of any length as operations of a [`Graph`]: recursive Newton-Euler for the torques of a motion, the
-//! composite-rigid-body algorithm for the mass matrix (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6).
+//! Dynamics of a chain of any length as operations of a [`Graph`]: recursive Newton-Euler for the torques of a motion,
+//! the composite-rigid-body algorithm for the mass matrix (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters
+//! 5 and 6).
 //!
 //! All vectors are in the axes of the link that they belong to, whose z is its joint's axis. Terms that the geometry
 //! makes zero or one are folded while the operations are written.

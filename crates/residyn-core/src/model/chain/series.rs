@@ -1,4 +1,4 @@
-//! Functions of the joint coordinates: polynomials in those that slide, Fourier series in those that turn.
+//! Functions of the joint coordinates: polynomials for prismatic joints, Fourier series for revolute ones.
 //!
 //! Products of sines and cosines are expanded into sums, so that each function has one form: equal functions compare
 //! equal, and terms that cancel vanish.

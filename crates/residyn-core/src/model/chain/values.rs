@@ -1,4 +1,4 @@
-//! The bodies of a chain for other values in its model file.
+//! The bodies of a chain for other values of its model file's parameters.
 
 use thiserror::Error;
 
@@ -19,7 +19,7 @@ pub enum ValuesError {
     )]
     Missing(String),
     #[error(
-        "no bodies have the model's values: the logs tell too little; fit to motion that moves all links more"
+        "no physical bodies have the model's values: the logs do not determine them; fit to motion that moves all links more"
     )]
     NoBodies,
 }

@@ -68,7 +68,7 @@ pub(super) fn drawn(joints: usize, rng: &mut impl Rng) -> Vec<Vec<f64>> {
 fn not_finite(samples: &[Sample]) -> Option<(&Sample, String)> {
     let is_finite = |sample: &Sample| sample.matrix.iter().all(|entry| entry.is_finite());
     let sample = samples.iter().find(|sample| !is_finite(sample))?;
-    Some((sample, "has an entry that is no number".to_owned()))
+    Some((sample, "has an entry that is not a number".to_owned()))
 }
 
 fn not_symmetric(samples: &[Sample]) -> Option<(&Sample, String)> {
@@ -83,7 +83,7 @@ fn not_symmetric(samples: &[Sample]) -> Option<(&Sample, String)> {
     let apart = (&worst.matrix - worst.matrix.transpose()).map(f64::abs);
     let (row, column) = apart.iamax_full();
     let message = format!(
-        "is not symmetric: {:.4} in row {}, column {}, and {:.4} across the diagonal, of which only the lower is used",
+        "is not symmetric: {:.4} in row {}, column {}, and {:.4} across the diagonal; only the lower one is used",
         worst.matrix[(row, column)],
         row + 1,
         column + 1,

@@ -1,4 +1,4 @@
-//! What a model file says that cannot be meant, though it can be read: one file a kind of finding.
+//! Statements in a model file that can be read but cannot be meant: one file per kind of finding.
 
 mod inputs;
 mod mass;

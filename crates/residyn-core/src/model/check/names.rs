@@ -39,7 +39,7 @@ pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
 fn taken_for(name: &str) -> Option<String> {
     let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
     if is_function(name) {
-        Some(format!("`{name}` is a function, too: choose another name"))
+        Some(format!("`{name}` is also a function: choose another name"))
     } else if NUMBERED.contains(&stem) {
         Some(format!(
             "`{name}` reads like a quantity of a joint: choose another name"
@@ -59,7 +59,7 @@ fn renamed(model: &Model, k: usize) -> Vec<String> {
         .filter(|(plain, name)| *plain != name)
         .map(|(plain, name)| {
             format!(
-                "`{plain}` is declared, so that this parameter of {} is called `{name}` in reports",
+                "`{plain}` is already declared, so this parameter of {} is called `{name}` in reports",
                 effect.label()
             )
         })
@@ -81,7 +81,7 @@ fn hiding(model: &Model, k: usize) -> Vec<String> {
         .filter(|name| known.contains(name) || is_function(name))
         .map(|name| {
             format!(
-                "the parameter `{name}` of {} hides what formulas know by that name",
+                "the parameter `{name}` of {} hides the quantity that formulas know by that name",
                 effect.name
             )
         })

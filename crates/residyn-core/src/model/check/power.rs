@@ -1,5 +1,5 @@
-//! Coriolis and centrifugal forces that do not belong to the mass matrix. Those that do neither add nor take energy,
-//! qd' (dM/dt / 2) qd = qd' c: the kinetic energy changes by what gravity, friction and motors do, and by nothing else.
+//! Coriolis and centrifugal forces that are not consistent with the mass matrix. Consistent ones neither add nor remove
+//! energy, qd' (dM/dt / 2) qd = qd' c: only gravity, friction and motors change the kinetic energy.
 
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
@@ -47,7 +47,7 @@ pub(super) fn find(model: &Model, places: &Places, rng: &mut impl Rng) -> Vec<Fi
         kind: Kind::Power,
         line: places.line(bias[0].at),
         text: format!(
-            "the terms of `bias` in products of velocities take {:.4} W where the mass matrix asks for {:.4}: check their signs \
+            "the velocity-product terms of `bias` take {:.4} W, but the mass matrix implies {:.4}: check their signs \
              and factors; at {}",
             worst.of_bias,
             worst.of_mass,

@@ -1,7 +1,7 @@
-//! Units that do not fit, where they are declared.
+//! Units that do not match, if they are declared.
 //!
-//! Exact where it reports anything: a term that contains a plain number has no known unit, since lengths are numbers in
-//! formulas that were derived from a drawing, and neither has a command or a parameter without `unit`. Angles are pure
+//! Every finding is certain: the unit of a term that contains a plain number is unknown, since formulas derived from a
+//! drawing have lengths as numbers, and so is the unit of a command or of a parameter without `unit`. Angles are pure
 //! numbers.
 
 use std::collections::HashMap;
@@ -65,8 +65,8 @@ impl Units<'_> {
             let known = declared(&parameter.unit);
             if known.is_none() && !parameter.unit.is_empty() {
                 let text = format!(
-                    "the unit `{}` of `{}` is not a product of SI units: values are in SI units, and what it takes part in is \
-                     not looked at",
+                    "the unit `{}` of `{}` is not a product of SI units: values are in SI units, and terms that \
+                     contain it are not checked",
                     parameter.unit, parameter.name
                 );
                 self.tell(self.places.parameter(&parameter.name), text);
@@ -220,7 +220,7 @@ impl Units<'_> {
             .filter(|unit| *unit != wanted)
         {
             let text = format!(
-                "{what} is `{}` [{unit}], and should be in [{wanted}]",
+                "{what} is `{}` [{unit}], but should be in [{wanted}]",
                 formula.text()
             );
             self.tell(line, text);

@@ -1,4 +1,4 @@
-//! Error of the torques: the model's inverse dynamics beside the logged torques.
+//! The torque error: the model's inverse dynamics compared with the logged torques.
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -31,7 +31,7 @@ impl TorqueError {
     pub fn share(&self) -> String {
         match self.relative.is_finite() {
             true => format!("{:.2} %", 100.0 * self.relative),
-            false => "no share, the logged torques are zero".to_owned(),
+            false => "no percentage, the logged torques are zero".to_owned(),
         }
     }
 }

@@ -69,13 +69,13 @@ impl Experiment {
         }
         let rising = self.episodes.is_sorted_by(|a, b| a < b);
         if !rising || self.episodes.first().is_none_or(|first| *first == 0) {
-            return Err("`episodes` are rising numbers above zero, for instance [1, 3]".into());
+            return Err("`episodes` must be increasing numbers above zero, such as [1, 3]".into());
         }
         for (k, Case { name, .. }) in self.cases.iter().enumerate() {
             let plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
             if name.is_empty() || !name.chars().all(plain) {
                 return Err(format!(
-                    "the name `{name}` of a case becomes part of file names; use letters, digits, - and _"
+                    "the case name `{name}` becomes part of file names; use letters, digits, - and _"
                 ));
             }
             if self.cases[..k].iter().any(|other| other.name == *name) {

@@ -1,5 +1,5 @@
-//! Closing the loop for control: a plant has an effect that the declared model lacks. How much of the return that this
-//! costs is recovered when the loop is closed on the logs of one or a few episodes?
+//! Closing the loop for control: a plant has an effect that the declared model lacks. How much of the lost return does
+//! closing the loop on the logs of one or a few episodes recover?
 //!
 //! The same planner drives the plant with the declared model, with the model that closing the loop gives, with a hybrid of
 //! the declared model and a network, and with the plant's own equations.

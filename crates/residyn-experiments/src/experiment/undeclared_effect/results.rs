@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{Case, Closed, Experiment, PlanningModel, Trial};
 use residyn_core::data::statistics::{bootstrap, mean, sample_deviation};
 use residyn_core::streams::{Purpose, stream};
-use residyn_report::Share;
+use residyn_plot::Share;
 
 /// The share of the lost return that is to be recovered after the first number of episodes.
 pub const TARGET: f64 = 0.9;

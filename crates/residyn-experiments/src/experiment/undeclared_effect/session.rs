@@ -38,7 +38,7 @@ impl Session {
         let task = Task::read(&beside_or_named(&experiment.path, &experiment.task))?;
         if task.system != declared.name {
             return Err(experiment.wrong(format!(
-                "the task is for {}, the model is of {}; give those that belong together",
+                "the task is for {}, but the model is of {}; give a matching pair",
                 task.system, declared.name
             )));
         }

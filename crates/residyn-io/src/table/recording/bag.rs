@@ -1,4 +1,5 @@
-//! rosbag2 in SQLite: the tables `topics` and `messages`. The names of the topics' columns are those since its first version.
+//! rosbag2 in SQLite: the tables `topics` and `messages`. The columns of `topics` have had these names since its first
+//! version.
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -17,7 +18,7 @@ pub(super) fn read(path: &Path, recording: &mut Recording) -> Result<(), LogErro
     add(path, recording).map_err(|why| LogError::Form {
         path: path.to_owned(),
         fault: format!(
-            "is no whole rosbag2: {why}; record it again, or save what is left: `sqlite3 run.db3 .recover | sqlite3 mended.db3`"
+            "is not a complete rosbag2: {why}; record it again, or save what is left: `sqlite3 run.db3 .recover | sqlite3 mended.db3`"
         ),
     })
 }
@@ -90,7 +91,7 @@ fn check_tables(bag: &Connection) -> Result<(), Box<dyn Error>> {
         let computed = "SELECT count(*) FROM pragma_table_xinfo(?1) WHERE hidden > 0";
         let count = |query| bag.query_row(query, [table], |row| row.get::<_, i64>(0));
         if count(stored)? != 1 || count(computed)? > 0 {
-            return Err(format!("`{table}` is no plain table").into());
+            return Err(format!("`{table}` is not a plain table").into());
         }
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! Which topic of a recording is the rig's.
+//! Chooses the rig's topic in a recording.
 
 use std::collections::{BTreeSet, HashMap};
 

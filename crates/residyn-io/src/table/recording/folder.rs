@@ -1,4 +1,5 @@
-//! A folder of rosbag2: its files hold all that is read here, so that one without its `metadata.yaml` is read as well.
+//! A rosbag2 folder. All that is read here is in the recording files, so a folder without `metadata.yaml` is read as
+//! well.
 
 use std::fs;
 use std::io;

@@ -1,4 +1,4 @@
-//! MCAP, read from its beginning to the end of its data: with or without an index, in chunks or not.
+//! MCAP, read from its beginning to the end of its data, with or without an index, in chunks or not.
 
 use std::borrow::Cow;
 use std::io::Read;
@@ -19,7 +19,7 @@ pub(super) fn read(path: &Path, recording: &mut Recording) -> Result<(), LogErro
         Ok(()) => Ok(()),
         Err(McapError::UnexpectedEof) => {
             recording.notes.push(format!(
-                "{} is cut off: what came before the cut is read",
+                "{} is cut off: only the part before the cut is read",
                 path.display()
             ));
             Ok(())

@@ -1,4 +1,4 @@
-//! Messages that hold numbers of joints, decoded to numbers by name.
+//! Messages with joint data, decoded to named numbers.
 
 use re_cdr::{BigEndian, LittleEndian, from_bytes};
 use serde::Deserialize;
@@ -39,7 +39,7 @@ fn cdr<T: DeserializeOwned + Numbers>(data: &[u8]) -> Result<Message, String> {
     let decoded = match encapsulation {
         [0, 0, ..] => from_bytes::<T, BigEndian>(body),
         [0, 1, ..] => from_bytes::<T, LittleEndian>(body),
-        _ => return Err("does not begin as CDR does".to_owned()),
+        _ => return Err("does not begin with a CDR header".to_owned()),
     };
     let (message, _) = decoded.map_err(|why| why.to_string())?;
     message.numbers()
@@ -231,7 +231,7 @@ mod tests {
         assert!(read(&encoded(&[0, 0, u32::MAX, 0], &[1.5])).is_err());
         assert_eq!(
             read(&[0, 7, 0, 0]).unwrap_err(),
-            "does not begin as CDR does"
+            "does not begin with a CDR header"
         );
     }
 

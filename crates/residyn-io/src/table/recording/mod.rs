@@ -1,4 +1,4 @@
-//! Recordings of a robot's messages, rosbag2 and MCAP: the topics that hold numbers of joints, as a table.
+//! Recordings of a robot's messages, rosbag2 and MCAP: the topics with joint data, as a table.
 
 mod bag;
 mod choose;

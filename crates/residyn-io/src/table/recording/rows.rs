@@ -1,4 +1,4 @@
-//! The table of the rig's topic, and of what other topics held at the times of its messages.
+//! The table of the rig's topic, with the values of other topics at the times of its messages.
 
 use super::{Recording, Sample, Series, Topic};
 use residyn_core::data::Arrays;

@@ -10,7 +10,7 @@ impl Found {
         let (command, name) = (&joint.tau, &joint.tau.name);
         if command.constant {
             let text = format!(
-                "{name} is {} throughout: gains of the drive cannot be told from the load; vary the command",
+                "{name} is {} throughout: the drive's gains cannot be distinguished from the load; vary the command",
                 short(command.max)
             );
             self.add_of(joint, Warning, text);

@@ -19,8 +19,8 @@ impl Found {
         let sizes = rows.iter().map(|&row| (angles[row] - without[row]).abs());
         let share = rows.len() as f64 / log.rows() as f64;
         let text = format!(
-            "{} jumps for {} single row(s) ({}), by up to {} rad, first at t = {} s: masked in fits, counted in errors on \
-             test logs; check the encoder's wiring",
+            "{} jumps in {} single row(s) ({}), by up to {} rad, first at t = {} s: masked in fits, counted in errors \
+             on test logs; check the encoder's wiring",
             joint.q.name,
             rows.len(),
             percent(share),
@@ -57,7 +57,7 @@ mod tests {
         let mut log = swing();
         log.q[0][1500] += 50.0;
         let words = [
-            "q1 jumps for 1 single row(s)",
+            "q1 jumps in 1 single row(s)",
             "up to 50 rad",
             "rig.csv@2.999-3.017",
         ];

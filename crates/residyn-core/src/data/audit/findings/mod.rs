@@ -49,7 +49,10 @@ pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
     let by_torque = log.driven_by == Quantity::Torque;
     let passive = by_torque && audit.joints.iter().all(is_passive);
     if passive {
-        found.add(Info, "all torques are zero throughout: a passive rig; only ratios to the inertia can be found");
+        found.add(
+            Info,
+            "all torques are zero throughout: on a passive rig, only ratios to the inertia can be identified",
+        );
     }
     for joint in &audit.joints {
         if !by_torque {
@@ -131,8 +134,8 @@ impl Found {
             self.add(
                 Info,
                 format!(
-                    "noise, resolution and motion are told by {examined_rows} of the {rows} rows, in intervals that are spread evenly \
-                     over the log; ranges, jumps, gaps and missing rows by all"
+                    "noise, resolution and motion are estimated from {examined_rows} of the {rows} rows, in intervals \
+                     spread evenly over the log; ranges, jumps, gaps and missing rows from all of them"
                 ),
             );
         }
@@ -151,8 +154,8 @@ impl Found {
             .max_by(|a, b| a.length_s().total_cmp(&b.length_s()))
         {
             let text = format!(
-                "{} gap(s), the longest of {} s at t = {} s: no window spans them, but the first rows after a gap tell \
-                 little of how the joints move; leave them out",
+                "{} gap(s), the longest of {} s at t = {} s: no window spans them, but the first rows after a gap say \
+                 little about how the joints move; leave them out",
                 gaps.len(),
                 short(longest.length_s()),
                 short(longest.start_s)
@@ -185,8 +188,8 @@ impl Found {
             &log.intervals(steps.iter().map(|step| step.row)),
             if share > FEW_DROPPED { Warning } else { Info },
             format!(
-                "{} row(s) are missing ({} as many as there are): the torque meanwhile is not known. Fits continue it \
-                 smoothly, and leave out steps in which it jumps; errors hold it from the row before, and so grow",
+                "{} row(s) are missing ({} of the number logged): the torque in between is unknown. Fits interpolate \
+                 it, and leave out steps in which it jumps; errors hold the last logged torque and therefore grow",
                 audit.dropped_rows,
                 percent(share)
             ),
@@ -206,8 +209,8 @@ impl Found {
         self.add(
             severity,
             format!(
-                "only {} s of motion, {} intervals of half a second: too few to tell effects apart; add logs, or record \
-                 for longer",
+                "only {} s of motion, {} intervals of half a second: too few to distinguish effects; add logs, or \
+                 record for longer",
                 short(motion_s),
                 (motion_s / 0.5).floor()
             ),
@@ -220,8 +223,8 @@ impl Found {
             self.add(
                 Warning,
                 format!(
-                    "{name} never reverses: dry friction cannot be told from a constant torque; move \
-                     in both directions"
+                    "{name} never reverses: dry friction cannot be distinguished from a constant torque; move in both \
+                     directions"
                 ),
             );
         }
@@ -245,8 +248,8 @@ impl Found {
                 &joint.repeated,
                 Serious,
                 format!(
-                    "{name} repeats the row before in {} of the rows in motion: the log is written \
-                     faster than the encoder is read; keep only rows that differ",
+                    "{name} repeats the previous row in {} of the rows in motion: the log is written faster than the \
+                     encoder is read; keep only rows that differ",
                     percent(joint.repeated_fraction)
                 ),
             );
@@ -320,7 +323,7 @@ pub(super) mod tests {
         let exact = stuck.q[0].clone();
         (0..3000).for_each(|row| stuck.q[0][row] = exact[row - row % 2]);
         // Except where the joint reverses.
-        let repeated = spans(&stuck, "q1 repeats the row before");
+        let repeated = spans(&stuck, "q1 repeats the previous row");
         let length_s: f64 = repeated.iter().map(|[start, end]| end - start).sum();
         assert!(
             length_s > 0.7 * 6.0 && repeated.iter().all(|span| span[1] < 6.05),

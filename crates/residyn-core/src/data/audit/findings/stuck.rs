@@ -25,8 +25,8 @@ impl Found {
             return;
         };
         let text = format!(
-            "{} stays the same to the last digit for up to {} s, {} time(s), and then jumps: the sensor or the bus froze; leave \
-             out where it did",
+            "{} stays the same to the last digit for up to {} s, {} time(s), and then jumps: the sensor or the bus \
+             froze; leave out these intervals",
             joint.q.name,
             short(longest),
             freezes.len()

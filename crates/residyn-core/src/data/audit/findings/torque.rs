@@ -34,8 +34,8 @@ impl Found {
             self.add(
                 Warning,
                 format!(
-                    "{name} never changes sign ({} to {} N m): its gain and a constant torque are hard \
-                     to tell apart; drive in both directions",
+                    "{name} never changes sign ({} to {} N m): its gain is hard to distinguish from a constant torque; \
+                     drive in both directions",
                     short(tau.min),
                     short(tau.max)
                 ),
@@ -90,7 +90,7 @@ impl Found {
         let (tau, name) = (&joint.tau, &joint.tau.name);
         let far_off = if demand.far_off > 0.0 {
             format!(
-                "; {} of the rows, up to {} N m, lie beyond twice the {} N m that the motion needs at most",
+                "; {} of the rows, up to {} N m, exceed twice the {} N m that the motion needs at most",
                 percent(demand.far_off),
                 short(tau.max.max(-tau.min)),
                 short(demand.needed_nm)
@@ -101,8 +101,8 @@ impl Found {
         self.add(
             if ratio > MUCH_CHATTER { Serious } else { Warning },
             format!(
-                "{name} chatters: {} N m (root mean square) faster than {} Hz beside {} N m slower, {} times as \
-                 much{far_off}. Hardly any of it moves the joint, all of it weighs in a least-squares fit of the \
+                "{name} chatters: {} N m (root mean square) above {} Hz against {} N m below, {} times as \
+                 much{far_off}. Hardly any of it moves the joint, but all of it counts in a least-squares fit of the \
                  torque: record again with softer gains or a smooth command",
                 short(demand.fast_nm),
                 short(demand.slow_hz),
@@ -122,14 +122,14 @@ impl Found {
         let remedy = if demand.explained_slow >= WELL_EXPLAINED {
             "do not trust parameters from a regression of the torque; fit trajectories, as closeloop does"
         } else {
-            "something else moves the joint (a hand, a contact, stiction), or the column is not the torque that acts; \
-             leave such intervals out, or check the column"
+            "something else moves the joint (a hand, a contact, stiction), or the column does not hold the acting \
+             torque; leave such intervals out, or check the column"
         };
         self.add(
             Warning,
             format!(
-                "the motion explains {} of the variance of {} as logged and {} of what is slower than {} Hz \
-                 (regression on gravity, friction and accelerations): {remedy}",
+                "the motion explains {} of the variance of {} as logged and {} of that below {} Hz (regression on \
+                 gravity, friction and accelerations): {remedy}",
                 percent(demand.explained),
                 joint.tau.name,
                 percent(demand.explained_slow),
@@ -152,7 +152,8 @@ impl Found {
             self.add(
                 Warning,
                 format!(
-                    "{name} is {} N m throughout: its gain cannot be told from a constant torque; vary the torque",
+                    "{name} is {} N m throughout: its gain cannot be distinguished from a constant torque; vary the \
+                     torque",
                     short(tau.max)
                 ),
             );
@@ -167,9 +168,8 @@ impl Found {
             self.add(
                 if steps > LONG_LAG_STEPS { Warning } else { Info },
                 format!(
-                    "the acceleration of joint {} {verb} {} by {} ({} steps, correlation {}): a delay of \
-                     the actuator or of the time stamps; shift the column by as much before inertias are taken \
-                     from rows",
+                    "the acceleration of joint {} {verb} {} by {} ({} steps, correlation {}): a delay of the actuator \
+                     or of the time stamps; shift the column by this much before you compute inertias row by row",
                     joint.joint,
                     joint.tau.name,
                     milliseconds(lag.lag_s.abs()),
@@ -202,7 +202,7 @@ mod tests {
             Serious,
             &[
                 "tau1 chatters: 3",
-                "faster than 10.6 Hz",
+                "above 10.6 Hz",
                 "2 % of the rows",
                 "smooth command"
             ]

@@ -32,8 +32,8 @@ impl Found {
         // Never serious: fits read no velocities.
         let severity = spike_severity(joint.qd.spikes, rows).max(Warning);
         let text = format!(
-            "{name} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: they count in errors of \
-                 velocities; `qd = []` under [columns] takes velocities from q{number}",
+            "{name} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: they count in velocity \
+             errors; `qd = []` under [columns] takes velocities from q{number}",
             joint.qd.spikes,
             percent(joint.qd.spikes as f64 / rows as f64),
             short(check.worst_rad_s)

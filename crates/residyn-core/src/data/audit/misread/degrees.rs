@@ -1,4 +1,4 @@
-//! Angles and velocities both in degrees, told by gravity: it goes with the sine of the angle.
+//! Angles and velocities both in degrees, recognised by gravity, which varies with the sine of the angle.
 
 use std::f64::consts::TAU;
 

@@ -1,7 +1,7 @@
-//! Columns that hold something else than the model file says, and the lines under `[columns]` that mend it.
+//! Columns that do not hold what the model file says, and the lines under `[columns]` that fix this.
 //!
-//! One file per kind. They are looked for one after the other, each in the log with the earlier fixes applied: an angle
-//! cannot be judged before its turns are counted, nor a speed before its time is in seconds.
+//! One file per kind. They are checked in turn, each on the log with the earlier fixes applied: an angle cannot be
+//! judged before its turns are counted, nor a speed before the time is in seconds.
 
 mod degrees;
 mod sign;
@@ -96,8 +96,8 @@ pub fn reversed_driving(
     let misread = Misread {
         joint: None,
         text: format!(
-            "with every {key} reversed, the declared model with friction leaves {} % of the error that it leaves as it is: all of \
-             them look like the opposite of what the model means",
+            "with every {key} reversed, the error of the declared model with friction falls to {} %: all of them seem \
+             to have the opposite sign",
             short(100.0 * share)
         ),
         changes: Joint::all(joints).map(opposite).collect(),

@@ -1,4 +1,4 @@
-//! Time in another unit than seconds.
+//! Time in a unit other than seconds.
 
 use super::{Change, Misread, Reading, To};
 use crate::data::audit::table::short;

@@ -1,4 +1,4 @@
-//! Angles that start each full turn anew.
+//! Angles that wrap at each full turn.
 
 use std::f64::consts::TAU;
 
@@ -33,8 +33,8 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
         Some(Misread {
             joint: Some(joint),
             text: format!(
-                "{name} jumps by a full turn ({}) {} time(s), first at t = {} s, and never leaves one turn: it starts each \
-                 turn anew, and its full turns are to be counted",
+                "{name} jumps by a full turn ({}) {} time(s), first at t = {} s, and stays within one turn: it wraps \
+                 at the end of a turn, and its full turns must be counted",
                 short(turn),
                 rows.len(),
                 short(log.time[rows[0] + 1])

@@ -1,4 +1,5 @@
-//! Velocities that are none, or in units that do not belong to those of the angles, told by the derivatives of the angles.
+//! Velocities that are not velocities, or whose units do not match those of the angles, judged by the angles'
+//! derivatives.
 
 use std::f64::consts::TAU;
 
@@ -68,9 +69,7 @@ fn wrong(audit: &JointAudit) -> Option<(String, Quantity, To)> {
     let text = format!("{qd} is {} times d{q}/dt", short(check.scale));
     let fits = |(size, ..): &&(f64, Quantity, &str)| (check.scale / size - 1.0).abs() < SAME;
     let Some(&(_, quantity, unit)) = RATIOS.iter().find(fits) else {
-        return derived(format!(
-            "{text}, a unit or a gear ratio that is not known here"
-        ));
+        return derived(format!("{text}, an unknown unit or gear ratio"));
     };
     let column = if quantity == Quantity::Angle { q } else { qd };
     Some((

@@ -1,4 +1,4 @@
-//! Masses, lengths and inertias of links with the fitted equations.
+//! Masses, lengths and inertias of links that have the fitted equations.
 
 use nalgebra::{Complex, Matrix3, Vector3};
 
@@ -174,7 +174,7 @@ fn likely_mass(inertia: f64, moment: Planar) -> f64 {
 fn link(inertia: f64, moment: Planar, mass: f64) -> Result<Inertia, String> {
     let own = inertia - moment.norm_sqr() / mass;
     if !(mass > 0.0 && own > 0.0) {
-        return Err("no bodies have such inertia".into());
+        return Err("no physical bodies have such inertia".into());
     }
     let at = Pose {
         rotation: Matrix3::identity(),
@@ -201,7 +201,7 @@ fn joint(number: usize, at: Planar, inertia: Inertia) -> Joint {
 /// A slide along x, in the world frame.
 fn slide(mass: f64) -> Result<Joint, String> {
     if mass <= 0.0 {
-        return Err("no bodies have such inertia".into());
+        return Err("no physical bodies have such inertia".into());
     }
     let own = Matrix3::identity() * (mass * GYRATION.powi(2));
     let inertia = Inertia::central(mass, own, &Pose::identity());

@@ -1,5 +1,5 @@
-//! Recovers a mechanism from equations of motion, for a few kinds: one joint, two that turn in one plane, one that turns
-//! on one that slides. Masses and lengths are chosen such that the motion is the same; the motion does not determine
+//! Recovers a mechanism from equations of motion, for a few kinds: one joint, two revolute joints in one plane, a
+//! revolute joint on a prismatic one. Masses and lengths are chosen to give the same motion, which does not determine
 //! all of them.
 
 mod links;
@@ -179,9 +179,9 @@ mod tests {
     #[test]
     fn equations_of_no_mechanism_are_refused() {
         for (bias, said) in [
-            ("q1^3", "none of the mechanisms"),
-            ("sin(2*q1)", "none of the mechanisms"),
-            ("tanh(qd1)", "none of the mechanisms"),
+            ("q1^3", "not one of the known mechanisms"),
+            ("sin(2*q1)", "not one of the known mechanisms"),
+            ("tanh(qd1)", "not one of the known mechanisms"),
             ("-qd1", "driven by its own speed"),
         ] {
             let text = format!(

@@ -10,7 +10,7 @@ use crate::model::chain::series::Series;
 pub(super) const SAME: f64 = 1e-9;
 /// A number below this share of what it is added to is rounding.
 pub(super) const ROUNDING: f64 = 1e-10;
-pub(super) const KNOWN: &str = "it is none of the mechanisms that are known: one joint, two that turn in one plane, one that turns on one that slides";
+pub(super) const KNOWN: &str = "it is not one of the known mechanisms: one joint, two revolute joints in one plane, a revolute joint on a prismatic one";
 
 /// The terms whose weighted sum gives the equations of one kind of mechanism.
 pub(super) struct Shape {
@@ -115,7 +115,7 @@ impl Shape {
                 .copy_from(&scaled(column));
         }
         let found = least_squares(left.clone(), &right, 1e-12)
-            .ok_or("its masses or forces are too small or too large to be told apart")?;
+            .ok_or("its masses or forces are too small or too large to be distinguished")?;
         let off = (&left * &found - &right).amax();
         if !(off <= SAME) {
             return Err(format!(

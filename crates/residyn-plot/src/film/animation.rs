@@ -1,14 +1,14 @@
-//! An episode to watch.
+//! Draws an episode as an animation.
 
 use svg::node::element::{Animate, Group, Path};
 
 use super::strips::{STRIP_HEIGHT, Strip, clock_value, draw_strips, entries, numbered, strip_axis};
-use crate::plot::PlotError;
-use crate::plot::axes::{Axis, FOOT, Frame, HEAD, remark};
-use crate::plot::canvas::{Area, curves, dots, dots_data, line_data, px};
-use crate::plot::legend::with_key;
-use crate::plot::scale::Range;
-use crate::plot::style::{MARGIN, Stroke, WIDTH};
+use crate::PlotError;
+use crate::axes::{Axis, FOOT, Frame, HEAD, remark};
+use crate::canvas::{Area, curves, dots, dots_data, line_data, px};
+use crate::legend::with_key;
+use crate::scale::Range;
+use crate::style::{MARGIN, Stroke, WIDTH};
 
 /// The eye gains nothing from more frames than this.
 const FRAMES_PER_S: f64 = 25.0;

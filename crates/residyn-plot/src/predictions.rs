@@ -1,4 +1,4 @@
-//! Predictions of a model and the measured motion.
+//! The figure of a model's predictions against the measured motion.
 
 use super::PlotError;
 use super::axes::{Axis, FOOT, Frame, HEAD, heading, no_data, remark};
@@ -196,7 +196,7 @@ fn visible_lines(track: &Track, frame: &Frame) -> Vec<Vec<(f64, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::{Panel, Track, predictions};
-    use crate::plot::{PlotError, Role};
+    use crate::{PlotError, Role};
 
     fn panel(role: Role, points: Vec<(f64, f64)>) -> Panel {
         let label = format!("{role:?}");

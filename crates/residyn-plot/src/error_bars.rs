@@ -1,4 +1,4 @@
-//! How far predictions are off, model by model.
+//! The figure of how far predictions are off, model by model.
 
 use std::f64::consts::TAU;
 
@@ -188,7 +188,7 @@ fn readable(error: f64, unit: &str) -> (f64, String) {
 #[cfg(test)]
 mod tests {
     use super::{Bar, ErrorRow, error_bars};
-    use crate::plot::{JointKind, PlotError, Role};
+    use crate::{JointKind, PlotError, Role};
 
     fn row(before: f64, after: Option<f64>) -> ErrorRow {
         let bar = |role, label: &str, error| Bar {

@@ -1,4 +1,4 @@
-//! Fewer points, the same picture.
+//! Thins curves: fewer points, the same picture.
 
 /// Thins a curve to at most `limit` points (at least two) and keeps its spikes.
 ///
@@ -22,7 +22,7 @@ pub fn decimate(points: &[(f64, f64)], limit: usize) -> Vec<(f64, f64)> {
 }
 
 /// The places between which straight lines are at most `off` away from every curve over `x`, including the ends.
-pub(crate) fn bends(x: &[f64], curves: &[Vec<f64>], off: f64) -> Vec<usize> {
+pub fn bends(x: &[f64], curves: &[Vec<f64>], off: f64) -> Vec<usize> {
     let last = x.len() - 1;
     let inner = bends_between(x, curves, off, 0, last);
     [vec![0], inner, vec![last]].concat()

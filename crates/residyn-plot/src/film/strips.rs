@@ -2,13 +2,13 @@
 
 use svg::node::element::{AnimateTransform, Group};
 
-use crate::plot::Quantity;
-use crate::plot::axes::{Axis, FOOT, Frame};
-use crate::plot::canvas::{Area, Canvas, clipped, curves, dots, px, rule};
-use crate::plot::decimate::{decimate, drawable_pieces};
-use crate::plot::legend::{Entry, Sample};
-use crate::plot::scale::Range;
-use crate::plot::style::{BLUE, GREEN, INK, OTHERS, SPINE, Stroke, VERMILION};
+use crate::Quantity;
+use crate::axes::{Axis, FOOT, Frame};
+use crate::canvas::{Area, Canvas, clipped, curves, dots, px, rule};
+use crate::decimate::{decimate, drawable_pieces};
+use crate::legend::{Entry, Sample};
+use crate::scale::Range;
+use crate::style::{BLUE, GREEN, INK, OTHERS, SPINE, Stroke, VERMILION};
 
 pub(super) const STRIP_HEIGHT: f64 = 126.0;
 const STRIP_GAP: f64 = 14.0;

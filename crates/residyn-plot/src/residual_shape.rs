@@ -214,7 +214,7 @@ fn with_curve(inner: SVG, frame: &Frame, role: Role, curve: &ShapeCurve) -> SVG 
 #[cfg(test)]
 mod tests {
     use super::{ShapeCurve, ShapeModel, ShapePanel, ShapeSample, residual_shape};
-    use crate::plot::{JointKind, PlotError, Role};
+    use crate::{JointKind, PlotError, Role};
     use residyn_core::data::Joint;
 
     fn panel(samples: Vec<ShapeSample>) -> ShapePanel {

@@ -1,4 +1,4 @@
-//! From numbers to pixels, and to the numbers on an axis.
+//! Scales: from numbers to pixels, and to the numbers on an axis.
 
 use residyn_core::data::statistics::quantile;
 

@@ -1,6 +1,6 @@
 use super::{Animation, Chain, animation, lengths_along, resampled};
 use crate::film::strips::{Strip, StripLine};
-use crate::plot::{PlotError, Quantity};
+use crate::{PlotError, Quantity};
 
 /// Two links of 1 m that turn at different speeds.
 fn acrobot(frames: usize, step_s: f64) -> Animation {

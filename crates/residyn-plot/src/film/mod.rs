@@ -7,7 +7,7 @@ use residyn_core::data::Joint;
 
 use self::animation::{Animation, Chain, animation};
 use self::strips::{Strip, StripLine};
-use super::plot::{PlotError, Quantity};
+use crate::{PlotError, Quantity};
 
 /// What a film shows.
 #[derive(Debug)]

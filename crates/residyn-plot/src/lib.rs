@@ -8,20 +8,22 @@
 //! The documents carry no identifiers and no style sheets, so that several can stand in one HTML page, and name
 //! only the generic font `sans-serif`.
 
-pub(super) mod axes;
-pub(super) mod canvas;
-pub(super) mod decimate;
+mod axes;
+mod canvas;
+mod decimate;
 mod error_bars;
+mod film;
 mod learning;
-pub(super) mod legend;
+mod legend;
 mod predictions;
 mod residual_shape;
-pub(super) mod scale;
-pub(super) mod style;
+mod scale;
+mod style;
 
 pub use axes::Quantity;
-pub use decimate::decimate;
+pub use decimate::{bends, decimate};
 pub use error_bars::{Bar, ErrorRow, error_bars};
+pub use film::{Film, film};
 pub use learning::{Course, LearningPanel, Method, MethodCurve, Spread, learning_curves};
 pub use predictions::{Panel, Track, predictions};
 pub use residual_shape::{ShapeCurve, ShapeModel, ShapePanel, ShapeSample, residual_shape};
@@ -90,4 +92,11 @@ impl JointKind {
             Self::Prismatic => "N",
         }
     }
+}
+
+/// A relative frequency with its 95 % interval.
+pub struct Share {
+    pub what: String,
+    pub share: f64,
+    pub interval: [f64; 2],
 }

@@ -1,4 +1,4 @@
-//! What planning gains as its model learns.
+//! The figure of what planning gains as its model learns.
 
 use svg::node::element::SVG;
 
@@ -273,7 +273,7 @@ fn add_remark(canvas: &mut Canvas, frame: &Frame, panel: &LearningPanel) {
 #[cfg(test)]
 mod tests {
     use super::{Course, LearningPanel, MethodCurve, Quantity, Spread, columns, learning_curves};
-    use crate::plot::{Method, PlotError, Scale};
+    use crate::{Method, PlotError, Scale};
 
     fn panel(x_scale: Scale, curves: Vec<MethodCurve>) -> LearningPanel {
         LearningPanel {
