@@ -303,28 +303,7 @@ pub(super) fn errors(report: &Report) -> String {
         names.join(" | "),
         "---|".repeat(names.len())
     );
-    let (before, after) = (&report.error.before, &report.error.after);
-    for (h, horizon) in report.error.horizons_s.iter().enumerate() {
-        for joint in Joint::all(report.joints) {
-            let rmse = |s: &ModelError| s.position_rmse[h][joint];
-            let cell = |(_, s): &(&str, &ModelError)| {
-                format!(
-                    "{} ({})",
-                    small(rmse(s)),
-                    small(s.position_median[h][joint])
-                )
-            };
-            let cells: Vec<String> = models.iter().map(cell).collect();
-            let _ = writeln!(
-                out,
-                "| {horizon} s | {} | {} | {} | {:.2} |",
-                report.label(joint),
-                before.windows[h],
-                cells.join(" | "),
-                rmse(after) / rmse(before).max(f64::MIN_POSITIVE)
-            );
-        }
-    }
+    out += &rows_of_errors(report, &models);
     for (name, model) in &models {
         out += &paragraph(diverged(name, model));
     }
@@ -351,6 +330,34 @@ pub(super) fn errors(report: &Report) -> String {
     }
     out += &paragraph(removed_of_motion(&report.error));
     out + "\n![predictions](predictions.svg)\n\n![errors](errors.svg)\n\n"
+}
+
+/// A row of the table for each horizon and joint.
+fn rows_of_errors(report: &Report, models: &[(&str, &ModelError)]) -> String {
+    let mut out = String::new();
+    let (before, after) = (&report.error.before, &report.error.after);
+    for (h, horizon) in report.error.horizons_s.iter().enumerate() {
+        for joint in Joint::all(report.joints) {
+            let rmse = |s: &ModelError| s.position_rmse[h][joint];
+            let cell = |(_, s): &(&str, &ModelError)| {
+                format!(
+                    "{} ({})",
+                    small(rmse(s)),
+                    small(s.position_median[h][joint])
+                )
+            };
+            let cells: Vec<String> = models.iter().map(cell).collect();
+            let _ = writeln!(
+                out,
+                "| {horizon} s | {} | {} | {} | {:.2} |",
+                report.label(joint),
+                before.windows[h],
+                cells.join(" | "),
+                rmse(after) / rmse(before).max(f64::MIN_POSITIVE)
+            );
+        }
+    }
+    out
 }
 
 pub(super) fn parameters(report: &Report) -> String {

@@ -64,29 +64,14 @@ impl Report {
                 .map(contradicted)
                 .collect(),
             identifiability: identifiability(outcome),
-            fits: FitsEntry {
-                moved_to: (outcome.models.moved_to.iter())
-                    .map(|parameter| (parameter.name.clone(), parameter.value))
-                    .collect(),
-                before: ended(&outcome.models.before.fit),
-                after: ended(&outcome.models.after.fit),
-            },
+            fits: fits(outcome),
             smoothing_velocities: outcome.models.after.model.smoothing_velocities(),
             compared: outcome.error_model,
             error: errors(outcome),
             torque: outcome.errors.torque.clone().map(TorqueEntry::from),
             residual_norm: norms(&outcome.diagnostics.before, &outcome.diagnostics.after),
             logs: logs(outcome),
-            audit: outcome
-                .given
-                .audits
-                .iter()
-                .map(|audit| AuditEntry {
-                    log: audit.log.clone(),
-                    findings: audit.findings.clone(),
-                    repeats: audit.repeats.clone(),
-                })
-                .collect(),
+            audit: audits(outcome),
             tried: tried(outcome),
             candidates: (outcome.effects.rounds.iter())
                 .map(|round| round.candidates)
@@ -106,6 +91,26 @@ impl Report {
                 plots: PLOTS.map(str::to_owned).to_vec(),
             },
         }
+    }
+}
+
+fn audits(outcome: &Outcome) -> Vec<AuditEntry> {
+    let audits = outcome.given.audits.iter().map(|audit| AuditEntry {
+        log: audit.log.clone(),
+        findings: audit.findings.clone(),
+        repeats: audit.repeats.clone(),
+    });
+    audits.collect()
+}
+
+fn fits(outcome: &Outcome) -> FitsEntry {
+    let moved_to = outcome.models.moved_to.iter();
+    FitsEntry {
+        moved_to: moved_to
+            .map(|parameter| (parameter.name.clone(), parameter.value))
+            .collect(),
+        before: ended(&outcome.models.before.fit),
+        after: ended(&outcome.models.after.fit),
     }
 }
 

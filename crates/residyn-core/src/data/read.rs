@@ -10,7 +10,7 @@ use super::late;
 use super::local_cubic::slopes;
 use super::log::Log;
 use super::statistics::median;
-use super::table::{Arrays, Table};
+use super::table::{Arrays, Numeric, Table};
 use crate::expr::listed;
 use crate::limits::{LOG_JOINTS, LOG_TIME, is_reading, log_steps, too_large};
 
@@ -118,7 +118,51 @@ fn log(
         names: table.names().to_vec(),
     };
     let layout = header.layout(joints, columns)?;
-    let path = path.to_owned();
+    let numbers = numbers(&header, table, &layout, joints)?;
+    let mut readings = Readings {
+        header: &header,
+        table,
+        numbers: numbers.into_iter(),
+        notes: [table.notes().to_vec(), notes(&layout)].concat(),
+    };
+    let time = readings.time(&layout.time)?;
+    let mut channel = |cells: &[Cell]| -> Result<Vec<Vec<f64>>, LogError> {
+        let each = cells.iter().map(|cell| readings.channel(cell, &time));
+        each.collect()
+    };
+    let q = channel(&layout.q)?;
+    let qd = layout.qd.as_deref().map(&mut channel).transpose()?;
+    let tau = layout.tau.as_deref().map(&mut channel).transpose()?;
+    let log = Log {
+        qd: qd.unwrap_or_else(|| q.iter().map(|q| slopes(&time, q)).collect()),
+        tau: tau.unwrap_or_else(|| vec![vec![0.0; time.len()]; joints]),
+        driven_by: columns.driven_by,
+        masked: vec![vec![]; joints],
+        filled: vec![],
+        notes: readings.notes,
+        q,
+        time,
+        leave_out: vec![],
+        path: path.to_owned(),
+    };
+    let log = late::cut(log, layout.late_s());
+    match log.rows() {
+        rows @ (0 | 1) => Err(LogError::TooFewRows {
+            path: log.path,
+            rows,
+        }),
+        _ => Ok(log),
+    }
+}
+
+/// The columns of a layout's cells, in their order.
+fn numbers(
+    header: &Header<'_>,
+    table: &mut dyn Table,
+    layout: &Layout,
+    joints: usize,
+) -> Result<Vec<Numeric>, LogError> {
+    let path = header.path.to_owned();
     let wanted: Vec<usize> = layout.cells().map(|cell| cell.index).collect();
     let numbers = table.numbers(&wanted)?;
     if numbers.rows < 2 {
@@ -139,86 +183,83 @@ fn log(
         let fault = too_large();
         return Err(LogError::Form { path, fault });
     }
-    let table: &dyn Table = table;
-    let fault = |row: usize, column: usize, fault: CellFault| match table.place(row) {
-        Ok(place) => LogError::Cell {
-            path: path.clone(),
-            place,
-            column: header.names[column].clone(),
-            fault,
-        },
-        Err(unreadable) => unreadable,
-    };
-    // The cells are read in the order in which they were requested.
-    let mut numbers = numbers.columns.into_iter();
-    let mut column = |cell: &Cell| -> Result<Vec<f64>, LogError> {
-        let mut read = numbers.next().unwrap_or_default();
+    Ok(numbers.columns)
+}
+
+/// The columns of a table as they become the channels of a log.
+struct Readings<'t> {
+    header: &'t Header<'t>,
+    table: &'t dyn Table,
+    /// Those of the layout's cells, in their order, as far as they are not read yet.
+    numbers: std::vec::IntoIter<Numeric>,
+    notes: Vec<String>,
+}
+
+impl Readings<'_> {
+    fn fault(&self, row: usize, cell: &Cell, fault: CellFault) -> LogError {
+        match self.table.place(row) {
+            Ok(place) => LogError::Cell {
+                path: self.header.path.to_owned(),
+                place,
+                column: self.header.names[cell.index].clone(),
+                fault,
+            },
+            Err(unreadable) => unreadable,
+        }
+    }
+
+    /// The next column, which is that of this cell, in its unit.
+    fn scaled(&mut self, cell: &Cell) -> Result<Vec<f64>, LogError> {
+        let mut read = self.numbers.next().unwrap_or_default();
         for (row, value) in read.values.iter_mut().enumerate() {
             let reading = cell.scale * *value;
             if !is_reading(reading) {
-                return Err(fault(row, cell.index, CellFault::TooLarge(*value)));
+                return Err(self.fault(row, cell, CellFault::TooLarge(*value)));
             }
             *value = reading;
         }
         match read.fault {
-            Some(why) => Err(fault(read.values.len(), cell.index, why)),
+            Some(why) => Err(self.fault(read.values.len(), cell, why)),
             None => Ok(read.values),
         }
-    };
-    let time = column(&layout.time)?;
-    if let Some(previous) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
-        let late = CellFault::NotLater {
-            time: time[previous + 1],
-            previous: time[previous],
-            previous_place: table.place(previous)?,
-        };
-        return Err(fault(previous + 1, layout.time.index, late));
     }
-    if let Some(row) = time.iter().position(|time| time.abs() > LOG_TIME) {
-        return Err(fault(row, layout.time.index, CellFault::TooLate(time[row])));
+
+    /// The column of times, which increase without a long pause.
+    fn time(&mut self, cell: &Cell) -> Result<Vec<f64>, LogError> {
+        let time = self.scaled(cell)?;
+        if let Some(previous) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+            let late = CellFault::NotLater {
+                time: time[previous + 1],
+                previous: time[previous],
+                previous_place: self.table.place(previous)?,
+            };
+            return Err(self.fault(previous + 1, cell, late));
+        }
+        if let Some(row) = time.iter().position(|time| time.abs() > LOG_TIME) {
+            return Err(self.fault(row, cell, CellFault::TooLate(time[row])));
+        }
+        if let Some(pause) = longest_pause(&time) {
+            let long = CellFault::Pause {
+                pause_s: pause.length_s,
+                step_s: pause.step_s,
+                previous_place: self.table.place(pause.row - 1)?,
+            };
+            return Err(self.fault(pause.row, cell, long));
+        }
+        Ok(time)
     }
-    if let Some(pause) = longest_pause(&time) {
-        let long = CellFault::Pause {
-            pause_s: pause.length_s,
-            step_s: pause.step_s,
-            previous_place: table.place(pause.row - 1)?,
-        };
-        return Err(fault(pause.row, layout.time.index, long));
-    }
-    let mut notes = [table.notes().to_vec(), notes(&layout)].concat();
-    let mut values = |cell: &Cell| -> Result<Vec<f64>, LogError> {
-        let mut values = column(cell)?;
+
+    /// The column of an angle, a velocity or a torque, at these times.
+    fn channel(&mut self, cell: &Cell, time: &[f64]) -> Result<Vec<f64>, LogError> {
+        let mut values = self.scaled(cell)?;
         if cell.wrapped {
-            let (name, passed) = (&header.names[cell.index], unwrap(&mut values, TAU));
-            notes.push(format!(
+            let passed = unwrap(&mut values, TAU);
+            let name = &self.header.names[cell.index];
+            self.notes.push(format!(
                 "{name} wraps {passed} times: full turns are counted"
             ));
         }
-        Ok(late::undone(&time, values, cell.late_s))
-    };
-    let mut channel = |cells: &[Cell]| cells.iter().map(&mut values).collect::<Result<Vec<_>, _>>();
-    let q = channel(&layout.q)?;
-    let qd = layout.qd.as_deref().map(&mut channel).transpose()?;
-    let tau = layout.tau.as_deref().map(&mut channel).transpose()?;
-    let log = Log {
-        qd: qd.unwrap_or_else(|| q.iter().map(|q| slopes(&time, q)).collect()),
-        tau: tau.unwrap_or_else(|| vec![vec![0.0; time.len()]; joints]),
-        driven_by: columns.driven_by,
-        masked: vec![vec![]; joints],
-        filled: vec![],
-        q,
-        time,
-        leave_out: vec![],
-        notes,
-        path,
-    };
-    let log = late::cut(log, layout.late_s());
-    match log.rows() {
-        rows @ (0 | 1) => Err(LogError::TooFewRows {
-            path: log.path,
-            rows,
-        }),
-        _ => Ok(log),
+        Ok(late::undone(time, values, cell.late_s))
     }
 }
 
