@@ -377,3 +377,18 @@ fn an_error_states_its_cause_once() {
         assert!(!out.exists(), "a folder was left behind");
     }
 }
+
+#[test]
+fn a_report_of_another_schema_is_refused_with_its_number() {
+    let scratch = Scratch::new();
+    let report = include_str!("golden/small_pendulum/report.json");
+    assert!(report.contains("\"schema\": 2"));
+    scratch.file(
+        "report.json",
+        report.replace("\"schema\": 2", "\"schema\": 1"),
+    );
+    says(
+        &refuses(&["report", text(&scratch.path(""))]),
+        &["it has schema 1", "reads schema 2", "make the report again"],
+    );
+}

@@ -1,11 +1,11 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::json::{CHECKPOINT, MODEL, PAGE, PLOTS, RANGES, REPORT, TEXT};
-use super::schema::Report;
+use super::schema::{Report, SCHEMA};
 use super::{model_file, page, picture, text};
 use residyn_core::closeloop::{Outcome, Stage};
 use residyn_core::model::Origin;
@@ -49,6 +49,12 @@ pub enum ReadError {
         error: std::io::Error,
     },
     #[error(
+        "{}: it has schema {found}, and this version of the program reads schema {SCHEMA}; make the report again with the command in \
+         its `configuration`",
+        path.display()
+    )]
+    Version { path: PathBuf, found: u32 },
+    #[error(
         "{}: {error}; if another version of the program wrote the report, make it again with the command in its `configuration`",
         path.display()
     )]
@@ -63,6 +69,12 @@ pub enum ReadError {
     Contradiction { path: PathBuf, fault: String },
 }
 
+/// What every version of `report.json` has.
+#[derive(Deserialize)]
+struct Version {
+    schema: u32,
+}
+
 impl Report {
     /// The report of a folder.
     ///
@@ -74,6 +86,11 @@ impl Report {
             Ok(json) => json,
             Err(error) => return Err(ReadError::File { path, error }),
         };
+        if let Ok(Version { schema: found }) = serde_json::from_slice(&json)
+            && found != SCHEMA
+        {
+            return Err(ReadError::Version { path, found });
+        }
         let report: Self = match serde_json::from_slice(&json) {
             Ok(report) => report,
             Err(error) => return Err(ReadError::Shape { path, error }),

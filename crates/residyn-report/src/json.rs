@@ -7,7 +7,7 @@ use super::plot_data::PlotData;
 use super::schema::{
     AlternativeEntry, AuditEntry, CombinationEntry, ContenderEntry, ContradictedEntry, EffectEntry,
     EffectName, ErrorEntry, FilesEntry, FitEntry, FitsEntry, IdentifiabilityEntry, LogEntry,
-    LogsEntry, ModelError, NormEntry, ParameterEntry, RefittedEntry, Report, TorqueEntry,
+    LogsEntry, ModelError, NormEntry, ParameterEntry, RefittedEntry, Report, SCHEMA, TorqueEntry,
     TriedEntry, UnexplainedEntry,
 };
 use residyn_core::closeloop::{
@@ -33,7 +33,7 @@ impl Report {
         let model = outcome.models.after.model.absorbed();
         let by_log = by_log(outcome);
         Self {
-            schema: 2,
+            schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             seed: origin.seed,
             configuration: origin.config.clone(),

@@ -18,13 +18,16 @@ use residyn_core::data::{Finding as AuditFinding, Joint, Severity};
 use residyn_core::model::Call;
 use residyn_core::sim::metric::TorqueError;
 
+/// Version of the names in `report.json`.
+pub(super) const SCHEMA: u32 = 2;
+
 /// The JSON schema (draft 2020-12) of [`Report`].
 pub fn schema() -> Value {
     let settings = SchemaSettings::draft2020_12().for_serialize();
     let mut schema = settings.into_generator().into_root_schema_for::<Report>();
     schema.insert(
         "title".into(),
-        "report.json of residyn closeloop, schema 1".into(),
+        format!("report.json of residyn closeloop, schema {SCHEMA}").into(),
     );
     schema.into()
 }
@@ -33,7 +36,7 @@ pub fn schema() -> Value {
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Report {
     /// version of these names
-    #[schemars(range(min = 1, max = 1))]
+    #[schemars(range(min = SCHEMA, max = SCHEMA))]
     pub(super) schema: u32,
     /// version of the program
     pub(super) version: String,
