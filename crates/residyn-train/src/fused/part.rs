@@ -9,7 +9,7 @@ use super::rollout::Rollout;
 use super::rows::total;
 use super::workspace::Workspace;
 use crate::Structure;
-use residyn_core::lanes::{Element, Vector};
+use residyn_core::lanes::Vector;
 use residyn_core::sim::batch::Rows;
 
 /// One thread's share of a loss, with buffers that are reused for the next loss.
@@ -125,11 +125,11 @@ impl Part {
     /// Adds up the lanes of the derivatives.
     #[inline(always)]
     fn add_up<S: Simd>(&mut self, simd: S) {
-        let workspace = &self.workspace;
+        let workspace = &mut self.workspace;
         self.by_networks
             .resize(workspace.network_sums.len(), Vec::new());
-        for (to, sums) in self.by_networks.iter_mut().zip(&workspace.network_sums) {
-            let sums = f32::registers::<S>(sums);
+        for (to, sums) in self.by_networks.iter_mut().zip(&mut workspace.network_sums) {
+            let sums = sums.registers::<S>();
             to.resize(sums.len(), 0.0);
             for (to, sum) in to.iter_mut().zip(sums) {
                 *to = Vector::<S, f32>::new(simd, *sum).sum();

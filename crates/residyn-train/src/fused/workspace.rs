@@ -2,8 +2,7 @@ use pulp::Simd;
 
 use super::problem::CHUNK;
 use crate::Structure;
-use residyn_core::lanes::Element;
-use residyn_core::sim::batch::{Network, Rows};
+use residyn_core::sim::batch::{GradientSums, Network, Rows};
 
 /// Working memory of both sweeps over a chunk, reused for the next chunk.
 #[derive(Debug, Default)]
@@ -11,8 +10,8 @@ pub(super) struct Workspace {
     pub scratch: Scratch,
     /// For each network, the derivatives by its features, `[block][feature]`.
     pub by_features: Vec<Vec<Rows>>,
-    /// For each network, the derivatives by its weights, one register each.
-    pub network_sums: Vec<Vec<f32>>,
+    /// For each network, the derivatives by its weights.
+    pub network_sums: Vec<GradientSums>,
     /// The derivative by each parameter that is not fixed.
     pub parameter_sums: Vec<Rows>,
 }
@@ -54,10 +53,10 @@ impl Workspace {
         let free = structure.parameters().iter().filter(|p| !p.fixed).count();
         self.parameter_sums.clear();
         self.parameter_sums.resize(free, Rows::splat(0.0));
-        self.network_sums.resize(networks.len(), Vec::new());
+        self.network_sums
+            .resize_with(networks.len(), GradientSums::default);
         for (sums, network) in self.network_sums.iter_mut().zip(networks) {
-            sums.clear();
-            sums.resize(network.numbers() * f32::lanes::<S>(), 0.0);
+            sums.clear::<S>(network.numbers());
         }
     }
 }

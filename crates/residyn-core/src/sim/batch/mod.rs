@@ -10,6 +10,7 @@ mod rollout;
 mod tests;
 
 pub use network::Network;
+pub use network_gradient::GradientSums;
 pub use product::{Finish, Product};
 pub use rollout::{Block, Rollouts};
 
