@@ -34,8 +34,8 @@ pub fn rounded(x: f64, resolution: f64) -> String {
 /// `0.1598 N m (0.1593 to 0.1603)`: a number with its interval and unit.
 pub fn amount_of(value: f64, ci95: Option<[f64; 2]>, unit: &str) -> String {
     let (value, ends) = digits_of(value, ci95);
-    let is_identifiable = |end: usize| ci95.is_some_and(|ends| ends[end].is_finite());
-    let interval = match (ends, is_identifiable(0), is_identifiable(1)) {
+    let is_bounded = |end: usize| ci95.is_some_and(|ends| ends[end].is_finite());
+    let interval = match (ends, is_bounded(0), is_bounded(1)) {
         (None, ..) => "not fitted".to_owned(),
         (Some([low, high]), true, true) => format!("{low} to {high}"),
         (Some([low, _]), true, false) => format!("{low} or more"),

@@ -2,7 +2,7 @@
 //! `residyn-core`.
 
 pub mod files;
-pub mod guarded;
+mod guarded;
 mod log_file;
 mod model_file;
 mod plant_file;

@@ -25,11 +25,8 @@ pub fn read_logs<P: AsRef<Path>>(
     paths: impl IntoIterator<Item = P>,
     model: &Model,
 ) -> Result<Vec<Log>, LogError> {
-    let mut paths = paths.into_iter();
-    paths.try_fold(vec![], |mut logs, path| {
-        logs.push(read_log(path, model)?);
-        Ok(logs)
-    })
+    let logs = paths.into_iter().map(|path| read_log(path, model));
+    logs.collect()
 }
 
 /// Reads one trajectory of a rig with `joints` joints: see [`Log::of_table`].

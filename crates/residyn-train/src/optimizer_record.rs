@@ -8,7 +8,7 @@ use burn::tensor::{Bytes, Tensor};
 use burn_pack::{Reader, Writer};
 
 use super::packed::Packed;
-use residyn_io::guarded::guarded;
+use residyn_io::guarded;
 
 /// The bytes of the record. Its tensors are sorted by name: an optimiser keeps them in an order that changes from run
 /// to run, and the same run must give the same file.

@@ -28,7 +28,7 @@ mod read;
 mod signal;
 mod smooth;
 pub mod statistics;
-pub mod table;
+mod table;
 mod trajectory;
 
 pub(crate) use audit::reversed_driving;

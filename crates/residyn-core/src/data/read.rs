@@ -30,7 +30,47 @@ impl Log {
         joints: usize,
         columns: &Columns,
     ) -> Result<Log, LogError> {
-        log(path, table, joints, columns)
+        let header = Header {
+            path,
+            place: table.head(),
+            names: table.names().to_vec(),
+        };
+        let layout = header.layout(joints, columns)?;
+        let numbers = numbers(&header, table, &layout, joints)?;
+        let mut readings = Readings {
+            header: &header,
+            table,
+            numbers: numbers.into_iter(),
+            notes: [table.notes().to_vec(), notes(&layout)].concat(),
+        };
+        let time = readings.time(&layout.time)?;
+        let mut channel = |cells: &[Cell]| -> Result<Vec<Vec<f64>>, LogError> {
+            let each = cells.iter().map(|cell| readings.channel(cell, &time));
+            each.collect()
+        };
+        let q = channel(&layout.q)?;
+        let qd = layout.qd.as_deref().map(&mut channel).transpose()?;
+        let tau = layout.tau.as_deref().map(&mut channel).transpose()?;
+        let log = Log {
+            qd: qd.unwrap_or_else(|| q.iter().map(|q| slopes(&time, q)).collect()),
+            tau: tau.unwrap_or_else(|| vec![vec![0.0; time.len()]; joints]),
+            driven_by: columns.driven_by,
+            masked: vec![vec![]; joints],
+            filled: vec![],
+            notes: readings.notes,
+            q,
+            time,
+            leave_out: vec![],
+            path: path.to_owned(),
+        };
+        let log = late::cut(log, layout.late_s());
+        match log.rows() {
+            rows @ (0 | 1) => Err(LogError::TooFewRows {
+                path: log.path,
+                rows,
+            }),
+            _ => Ok(log),
+        }
     }
 
     /// As [`Log::of_table`], for a table with the standard columns and as many joints as its header has, in its order
@@ -61,7 +101,7 @@ impl Log {
         }
         match rig {
             Some((joints, columns)) => {
-                log(path, &mut table, joints, &columns.completed(joints, path)?)
+                Log::of_table(path, &mut table, joints, &columns.completed(joints, path)?)
             }
             None => {
                 let has = |name: &str| table.names().iter().any(|known| known == name);
@@ -88,7 +128,7 @@ fn standard(path: &Path, table: &mut dyn Table, driven_by: Quantity) -> Result<L
     };
     // A header without joints lacks the first.
     let count = numbered.max(columns.joint_names.len()).max(1);
-    log(path, table, count, &columns)
+    Log::of_table(path, table, count, &columns)
 }
 
 /// Refuses more joints than are read without a model that chooses among them.
@@ -102,56 +142,6 @@ fn check_joints(path: &Path, joints: usize) -> Result<(), LogError> {
                  [columns]"
             ),
         }),
-    }
-}
-
-/// The log in a file's table.
-fn log(
-    path: &Path,
-    table: &mut dyn Table,
-    joints: usize,
-    columns: &Columns,
-) -> Result<Log, LogError> {
-    let header = Header {
-        path,
-        place: table.head(),
-        names: table.names().to_vec(),
-    };
-    let layout = header.layout(joints, columns)?;
-    let numbers = numbers(&header, table, &layout, joints)?;
-    let mut readings = Readings {
-        header: &header,
-        table,
-        numbers: numbers.into_iter(),
-        notes: [table.notes().to_vec(), notes(&layout)].concat(),
-    };
-    let time = readings.time(&layout.time)?;
-    let mut channel = |cells: &[Cell]| -> Result<Vec<Vec<f64>>, LogError> {
-        let each = cells.iter().map(|cell| readings.channel(cell, &time));
-        each.collect()
-    };
-    let q = channel(&layout.q)?;
-    let qd = layout.qd.as_deref().map(&mut channel).transpose()?;
-    let tau = layout.tau.as_deref().map(&mut channel).transpose()?;
-    let log = Log {
-        qd: qd.unwrap_or_else(|| q.iter().map(|q| slopes(&time, q)).collect()),
-        tau: tau.unwrap_or_else(|| vec![vec![0.0; time.len()]; joints]),
-        driven_by: columns.driven_by,
-        masked: vec![vec![]; joints],
-        filled: vec![],
-        notes: readings.notes,
-        q,
-        time,
-        leave_out: vec![],
-        path: path.to_owned(),
-    };
-    let log = late::cut(log, layout.late_s());
-    match log.rows() {
-        rows @ (0 | 1) => Err(LogError::TooFewRows {
-            path: log.path,
-            rows,
-        }),
-        _ => Ok(log),
     }
 }
 

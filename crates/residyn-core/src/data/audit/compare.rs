@@ -125,7 +125,7 @@ pub(super) fn opposed_velocity(
 
 /// Rows, and the logged velocity of each with the derivative of the angle `lag_s` earlier.
 fn aligned_velocities(motion: &Motion, lag_s: f64) -> (Vec<usize>, Vec<(f64, f64)>) {
-    let of_stretch = |interval: &Range<usize>| {
+    let of_interval = |interval: &Range<usize>| {
         let (time, velocity) = (
             &motion.time[interval.clone()],
             &motion.velocity[interval.clone()],
@@ -134,7 +134,7 @@ fn aligned_velocities(motion: &Motion, lag_s: f64) -> (Vec<usize>, Vec<(f64, f64
         let pair = move |k: usize| Some((motion.rows[k], (motion.qd[k], derived(k)?)));
         interval.clone().filter_map(pair)
     };
-    motion.intervals.iter().flat_map(of_stretch).unzip()
+    motion.intervals.iter().flat_map(of_interval).unzip()
 }
 
 /// Ratio of logged to derived velocity: the median over the rows faster than a third of the fast

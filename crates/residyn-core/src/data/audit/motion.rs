@@ -96,9 +96,9 @@ impl Motion {
     /// One of its columns at a uniform step \[s\], interval after interval.
     pub fn resampled(&self, values: &[f64], step_s: f64) -> Vec<f64> {
         let intervals = self.intervals.iter().cloned();
-        let of_stretch =
+        let of_interval =
             |rows: Range<usize>| resample(&self.time[rows.clone()], &values[rows], step_s);
-        intervals.flat_map(of_stretch).collect()
+        intervals.flat_map(of_interval).collect()
     }
 
     /// Number of rows.
