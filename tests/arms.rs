@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use residyn::read_log;
 use residyn_core::data::{Interval, Joint};
-use residyn_core::identify::fit_torques;
+use residyn_core::identify::{LevenbergMarquardt, fit_torques};
 use residyn_core::model::chain::Inertia;
 use residyn_core::model::{FittedEffect, Library, Model};
 use residyn_core::sim::metric::torque_error;
@@ -233,7 +233,7 @@ fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
         }
     }
     let [train, test] = [1, 2].map(|seed| vec![moved(&rig, 20.0, seed)]);
-    let found = fit_torques(&with(0.1), &declared, &train).unwrap();
+    let found = fit_torques(&LevenbergMarquardt::USUAL, &with(0.1), &declared, &train).unwrap();
     assert!(
         found.fit.termination.has_converged(),
         "{}",
@@ -335,7 +335,9 @@ fn fitted_torques_of_measured_arms_are_as_near_as_by_least_squares() {
         let with = declared
             .with_effects(effects)
             .with_smoothing_velocities(widths);
-        let found = fit_torques(&with, &declared, &[train]).unwrap().model;
+        let found = fit_torques(&LevenbergMarquardt::USUAL, &with, &declared, &[train])
+            .unwrap()
+            .model;
         let error = 100.0 * torque_error(&found, &[test]).unwrap().relative;
         assert!(
             error < least_squares,

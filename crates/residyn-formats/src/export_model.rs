@@ -191,10 +191,9 @@ impl ExportModel {
     /// Whether the equations use the time.
     pub(super) fn depends_on_time(&self) -> bool {
         let program = &self.equations.program;
-        let time = program
-            .ops()
-            .iter()
-            .position(|op| matches!(op, Op::Input(k) if *k as usize == 3 * self.joints()));
+        let time = program.ops().iter().position(
+            |op| matches!(op, Op::Input(k) if *k as usize == self.equations.layout().time()),
+        );
         let mut operands = program.ops().iter().flat_map(|op| op.operands());
         operands.any(|node| Some(node.index()) == time)
     }

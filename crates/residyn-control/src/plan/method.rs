@@ -4,12 +4,14 @@ use super::population::Population;
 use super::proposal::Proposal;
 
 /// What distinguishes one search method from another.
-pub trait Search {
+pub trait Search: Send + Sync {
     /// Refuse settings that do not fit a population of this size.
     ///
     /// # Errors
     /// One sentence that names the key, its value and what it may be.
-    fn check(&self, population: usize) -> Result<(), SettingsError>;
+    fn check(&self, _population: usize) -> Result<(), SettingsError> {
+        Ok(())
+    }
 
     /// Standard deviation of the candidates in the first iteration, as a share of half an input's range.
     fn deviation(&self) -> f64 {

@@ -52,7 +52,7 @@ impl Noise {
     }
 
     /// Write the next numbers, `[step * n + input]`.
-    pub fn fill(&mut self, arch: Arch, rng: &mut impl Rng, rows: &mut [Rows]) {
+    pub(super) fn fill(&mut self, arch: Arch, rng: &mut impl Rng, rows: &mut [Rows]) {
         let Some(colour) = &mut self.colour else {
             return self.gaussian.fill(arch, rng, rows);
         };

@@ -1,11 +1,12 @@
-use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use rand_chacha::ChaCha8Rng;
 
-use super::Settings;
+use super::method::Search;
 use super::noise::Noise;
 use super::population::Population;
 use super::proposal::Proposal;
+use super::settings::{Settings, Size};
 use residyn_core::lanes::{Arch, WorkerPool};
 use residyn_core::sim::batch::{Rows, W};
 
@@ -24,15 +25,16 @@ pub trait Evaluate: Send {
     fn returns(&mut self, start: &Self::Prepared, inputs: &[Rows], returns: &mut Rows);
 }
 
-/// A search for the inputs that maximise a return, by the [`Method`](super::Method) of its settings: draw sequences,
-/// evaluate them, and draw the next ones near the best. The rest of a plan is the initial guess of the next search.
+/// A search for the inputs that maximise a return, by the [`Method`](super::Method) of its settings or a [`Search`] of
+/// your own: draw sequences, evaluate them, and draw the next ones near the best. The rest of a plan is the initial guess of the next search.
 ///
 /// Plan repeatedly within [`Planner::with_workers`] to use all cores.
 ///
 /// Candidates are clipped to the bounds before they are evaluated. The result is the same on any number of processor
 /// cores: each block of candidates has its own random stream.
 pub struct Planner<E: Evaluate> {
-    settings: Settings,
+    search: Arc<dyn Search>,
+    size: Size,
     // Locks, since the workers share all of it with the calling thread. They are never contended.
     start: RwLock<Option<E::Prepared>>,
     proposal: RwLock<Proposal>,
@@ -74,18 +76,37 @@ impl<E: Evaluate> Planner<E> {
         rng: &ChaCha8Rng,
     ) -> Self {
         settings.check().expect("settings that have been checked");
+        Self::by(
+            settings.method.search(),
+            settings.size(),
+            bounds,
+            evaluate,
+            rng,
+        )
+    }
+
+    /// The same by any method.
+    ///
+    /// # Panics
+    /// When there are no bounds or an empty range.
+    pub fn by(
+        search: Arc<dyn Search>,
+        size: Size,
+        bounds: &[[f64; 2]],
+        evaluate: impl Fn() -> E,
+        rng: &ChaCha8Rng,
+    ) -> Self {
         assert!(!bounds.is_empty(), "something to search");
         assert!(
             bounds.iter().all(|[low, high]| low < high),
             "ranges that are not empty"
         );
-        let Settings {
+        let Size {
             population,
             horizon,
-            method,
             ..
-        } = *settings;
-        let noise = method.search().noise(horizon, bounds.len());
+        } = size;
+        let noise = search.noise(horizon, bounds.len());
         let block = |index: usize| {
             let mut rng = rng.clone();
             rng.set_stream(index as u64);
@@ -99,7 +120,8 @@ impl<E: Evaluate> Planner<E> {
             }
         };
         Self {
-            settings: *settings,
+            search,
+            size,
             start: RwLock::new(None),
             proposal: RwLock::new(Proposal::new(bounds, horizon)),
             blocks: (0..population.div_ceil(W))
@@ -128,15 +150,14 @@ impl<E: Evaluate> Planner<E> {
 
     /// Search for the best inputs from `start`.
     pub fn plan(&self, start: E::Start) -> Plan {
-        let Settings {
+        let Size {
             population,
             iterations,
             horizon,
-            method,
-        } = self.settings;
+        } = self.size;
         let start = lock(&self.blocks[0]).evaluate.prepare(start, horizon);
         *write(&self.start) = Some(start);
-        write(&self.proposal).begin(method.search().deviation());
+        write(&self.proposal).begin(self.search.deviation());
         let (mut best, mut diverged) = (f32::NEG_INFINITY, 0);
         for _ in 0..iterations {
             let tasks = self.blocks.len();
@@ -145,7 +166,7 @@ impl<E: Evaluate> Planner<E> {
             let evaluated = blocks.iter().map(|b| (b.inputs.as_slice(), &b.returns));
             let population = Population::new(evaluated, population);
             let mut proposal = write(&self.proposal);
-            method.search().learn(&population, &mut proposal);
+            self.search.learn(&population, &mut proposal);
             best = population.best();
             diverged += population.diverged();
         }

@@ -11,7 +11,7 @@ pub struct Population<'a> {
 
 impl<'a> Population<'a> {
     /// The first `size` candidates of these blocks: inputs and returns.
-    pub fn new(blocks: impl Iterator<Item = (&'a [Rows], &'a Rows)>, size: usize) -> Self {
+    pub(super) fn new(blocks: impl Iterator<Item = (&'a [Rows], &'a Rows)>, size: usize) -> Self {
         let (inputs, returns): (Vec<_>, Vec<&Rows>) = blocks.unzip();
         let returns = returns.iter().flat_map(|row| row.0).zip(0..size);
         Self {

@@ -24,7 +24,7 @@ pub struct Proposal {
 
 impl Proposal {
     #[allow(clippy::cast_possible_truncation)] // planning runs in f32
-    pub fn new(bounds: &[[f64; 2]], horizon: usize) -> Self {
+    pub(super) fn new(bounds: &[[f64; 2]], horizon: usize) -> Self {
         let bounds: Vec<[f32; 2]> = bounds.iter().map(|range| range.map(|x| x as f32)).collect();
         let centres = bounds.iter().map(|[low, high]| 0.5 * (low + high));
         let middle: Vec<f32> = centres.cycle().take(horizon * bounds.len()).collect();
@@ -40,7 +40,7 @@ impl Proposal {
 
     /// Start a search around the mean with this standard deviation, as a share of half an input's range.
     #[allow(clippy::cast_possible_truncation)] // planning runs in f32
-    pub fn begin(&mut self, deviation: f64) {
+    pub(super) fn begin(&mut self, deviation: f64) {
         self.first = true;
         let share = 0.5 * deviation as f32;
         for (deviation, [low, high]) in self.deviation.iter_mut().zip(self.bounds.iter().cycle()) {
@@ -48,13 +48,13 @@ impl Proposal {
         }
     }
 
-    pub fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.mean.copy_from_slice(&self.middle);
         self.kept.clear();
     }
 
     /// Drop the first `steps`, which have been executed.
-    pub fn shift(&mut self, steps: usize) {
+    pub(super) fn shift(&mut self, steps: usize) {
         let done = (steps * self.bounds.len()).min(self.mean.len());
         self.mean.rotate_left(done);
         let left = self.mean.len() - done;
@@ -102,7 +102,7 @@ impl Proposal {
     }
 
     /// The best kept sequence, or the mean if none is kept: `[step][input]`.
-    pub fn plan(&self) -> Vec<Vec<f64>> {
+    pub(super) fn plan(&self) -> Vec<Vec<f64>> {
         let steps = self.kept.first().unwrap_or(&self.mean);
         steps
             .chunks(self.bounds.len())
@@ -111,7 +111,7 @@ impl Proposal {
     }
 
     /// Turn standard normal numbers into the candidates of the block with this index.
-    pub fn place(&self, arch: Arch, block: usize, inputs: &mut [Rows]) {
+    pub(super) fn place(&self, arch: Arch, block: usize, inputs: &mut [Rows]) {
         arch.dispatch(Place {
             bounds: &self.bounds,
             mean: self.mean_of(block),

@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use super::limits::{SettingsError, whole};
@@ -25,6 +27,16 @@ pub struct Settings {
     pub method: Method,
 }
 
+/// How much a search evaluates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    /// Candidates evaluated in each iteration.
+    pub population: usize,
+    pub iterations: usize,
+    /// Steps of a plan.
+    pub horizon: usize,
+}
+
 /// How the next candidates follow from the last.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "method", rename_all = "snake_case")]
@@ -45,6 +57,15 @@ impl Settings {
         whole("horizon", self.horizon, HORIZON)?;
         self.method.search().check(self.population)
     }
+
+    /// How much the search evaluates.
+    pub fn size(&self) -> Size {
+        Size {
+            population: self.population,
+            iterations: self.iterations,
+            horizon: self.horizon,
+        }
+    }
 }
 
 impl Method {
@@ -63,11 +84,11 @@ impl Method {
         }
     }
 
-    pub(super) fn search(&self) -> &dyn Search {
+    pub(super) fn search(self) -> Arc<dyn Search> {
         match self {
-            Self::Cem(cem) => cem,
-            Self::Icem(icem) => icem,
-            Self::Mppi(mppi) => mppi,
+            Self::Cem(cem) => Arc::new(cem),
+            Self::Icem(icem) => Arc::new(icem),
+            Self::Mppi(mppi) => Arc::new(mppi),
         }
     }
 }

@@ -25,7 +25,13 @@ impl Problem<'_> {
         let model = self
             .declared
             .with_effects([own, friction.as_slice()].concat());
-        let fitted = fit_torques(&self.smoothed(&model), self.declared, self.logs).ok()?;
+        let fitted = fit_torques(
+            self.solver,
+            &self.smoothed(&model),
+            self.declared,
+            self.logs,
+        )
+        .ok()?;
         let torque = torque_error(&fitted.model, self.logs)?.relative;
         if self.declared.joints > self.settings.fit.most_joints_by_motion {
             return Some(true);

@@ -93,7 +93,12 @@ impl<'a> Problem<'a> {
         let own = &self.declared.effects;
         let model = self.declared.with_effects([own, friction].concat());
         let problem = self.with_smoothing_velocities(self.best_smoothing_velocities(&model)?);
-        let beside = fit_torques(&problem.smoothed(&model), self.declared, self.logs)?;
+        let beside = fit_torques(
+            self.solver,
+            &problem.smoothed(&model),
+            self.declared,
+            self.logs,
+        )?;
         // The logs there are already smoothed as needed here.
         let windows = cut(self.logs, self.settings.fit.window_s);
         let problem = problem.over(beside.shooting.over(windows));
@@ -117,7 +122,7 @@ impl<'a> Problem<'a> {
                 .map(|top| share * top.max(1e-6))
                 .collect();
             let model = model.with_smoothing_velocities(widths.clone());
-            let found = fit_torques(&model, self.declared, self.logs)?;
+            let found = fit_torques(self.solver, &model, self.declared, self.logs)?;
             Ok((found.shooting.noise, widths))
         };
         let shares = self.settings.fit.wider_sign_shares;

@@ -11,6 +11,7 @@ use super::settings::Settings;
 use super::split::SplitMethod;
 use super::stage::{Stage, Watch};
 use crate::data::{Audit, Finding, Log, Severity, audit_together};
+use crate::identify::Solver;
 use crate::limits::FITTED_PARAMETERS;
 use crate::model::{Library, Model};
 use crate::sim::metric::window_count;
@@ -29,6 +30,8 @@ pub struct Prepared<'a> {
     pub unscored_s: Vec<f64>,
     /// Which errors to compare; if not given, those that say more about these logs.
     pub error_model: Option<ErrorModel>,
+    /// Finds the minimum of each fit.
+    pub solver: &'a dyn Solver,
     /// Trains the residual network; without it there is none.
     pub learner: Option<&'a dyn ResidualLearner>,
     pub split: SplitMethod,
@@ -56,6 +59,7 @@ pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> 
         against,
         mut settings,
         error_model,
+        solver,
         learner,
         ..
     } = request;
@@ -83,6 +87,7 @@ pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> 
         against,
         unscored_s,
         error_model,
+        solver,
         learner,
         settings,
     }
@@ -128,7 +133,10 @@ impl Prepared<'_> {
     /// The problem, in terms of these errors.
     pub(super) fn problem(&self, error_model: ErrorModel) -> Problem<'_> {
         let logs = (&*self.train.for_fits, self.train.audits.clone());
-        Problem::audited(self.model, self.library, error_model, logs, &self.settings)
+        Problem {
+            solver: self.solver,
+            ..Problem::audited(self.model, self.library, error_model, logs, &self.settings)
+        }
     }
 
     /// The audits of all logs, the test logs last.

@@ -6,7 +6,9 @@ use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
 use super::split::by_numbers;
 use crate::data::{Audit, JointAudit, Log, audit};
-use crate::identify::{FitError, Identifiability, Shooting, cut, fit, fit_below};
+use crate::identify::{
+    FitError, Identifiability, LevenbergMarquardt, Shooting, Solver, cut, fit_below, fit_by,
+};
 use crate::model::{Dynamics, Effect, FittedEffect, Library, Model, Parameter};
 
 /// A declared model, the effects that it may lack, and the logs to learn from, with what follows from them.
@@ -21,6 +23,8 @@ pub struct Problem<'a> {
     pub library: &'a Library,
     pub error_model: ErrorModel,
     pub settings: &'a Settings,
+    /// Finds the minimum of each fit.
+    pub solver: &'a dyn Solver,
     pub logs: &'a [Log],
     /// One per log, made on first use.
     pub(super) audits: Arc<OnceLock<Vec<Audit>>>,
@@ -139,6 +143,7 @@ impl<'a> Problem<'a> {
             declared,
             library,
             error_model,
+            solver: &LevenbergMarquardt::USUAL,
             settings,
             logs,
             audits: Arc::new(audits.into()),
@@ -197,6 +202,7 @@ impl<'a> Problem<'a> {
             declared: self.declared,
             library: self.library,
             error_model: self.error_model,
+            solver: self.solver,
             settings: self.settings,
             logs,
             audits: Arc::default(),
@@ -282,7 +288,14 @@ impl<'a> Problem<'a> {
         let model = self.smoothed(model);
         let dynamics = self.error_model.compile(&model);
         let active = self.active(&dynamics);
-        let found = fit(&self.shooting, &dynamics, &active, start_states, scale)?;
+        let found = fit_by(
+            self.solver,
+            &self.shooting,
+            &dynamics,
+            &active,
+            start_states,
+            scale,
+        )?;
         Ok(Fitted::new(&model, &dynamics, found, self.logs))
     }
 
@@ -324,7 +337,15 @@ impl<'a> Problem<'a> {
         let dynamics = self.error_model.compile(&model);
         let (active, start_states) = (self.active(&dynamics), fitted.fit.start_states.clone());
         let aim = (fitted.fit.scale, below);
-        let found = fit_below(&self.shooting, &dynamics, &active, start_states, aim).ok()??;
+        let found = fit_below(
+            self.solver,
+            &self.shooting,
+            &dynamics,
+            &active,
+            start_states,
+            aim,
+        )
+        .ok()??;
         Some(Fitted::new(&model, &dynamics, found, self.logs))
     }
 

@@ -3,6 +3,7 @@ use super::learn::ResidualLearner;
 use super::settings::Settings;
 use super::split::Split;
 use crate::data::Log;
+use crate::identify::{LevenbergMarquardt, Solver};
 use crate::model::{Library, Model};
 
 /// The inputs of closing the loop.
@@ -19,6 +20,8 @@ pub struct Request<'a> {
     pub settings: Settings,
     /// Which errors to compare; if not given, those that say more about these logs.
     pub error_model: Option<ErrorModel>,
+    /// Finds the minimum of each fit.
+    pub solver: &'a dyn Solver,
     /// Trains the residual network; without it there is none.
     pub learner: Option<&'a dyn ResidualLearner>,
 }
@@ -42,7 +45,7 @@ pub struct Reference {
 }
 
 impl<'a> Request<'a> {
-    /// A request with the default settings, without a residual network and without reference models.
+    /// A request with the default settings and solver, without a residual network and without reference models.
     pub fn new(model: &'a Model, library: &'a Library, split: Split) -> Self {
         Self::on(model, library, Logs::Divided(split))
     }
@@ -61,6 +64,7 @@ impl<'a> Request<'a> {
             against: Vec::new(),
             settings: Settings::default(),
             error_model: None,
+            solver: &LevenbergMarquardt::USUAL,
             learner: None,
         }
     }

@@ -7,7 +7,7 @@ use super::values::Values;
 use crate::data::{Joint, Log, Smooth, Smoothing, row_from};
 use crate::expr::Tape;
 use crate::lanes::Row;
-use crate::model::Dynamics;
+use crate::model::{Dynamics, InputLayout};
 use crate::sim::{Commands, Delivered, Point, Window};
 
 /// A log as the torque error reads it, thinned out.
@@ -147,19 +147,23 @@ impl Balance {
                 }))
             };
             let joints = self.weight.len();
+            let layout = InputLayout::of(joints);
             let filters = acting.slopes[0].len();
             let moving = tape.moving();
             for j in 0..joints {
                 moving[j] = of(&|log, at| rows[log].smooth.q[j][at]);
-                moving[joints + j] = of(&|log, at| rows[log].smooth.qd[j][at]);
-                moving[2 * joints + j] = of(&|log, at| acting.tau[log][j][at]);
-                moving[3 * joints + 1 + j] = of(&|log, at| rows[log].smooth.qdd[j][at]);
-                moving[4 * joints + 1 + j] = of(&|log, at| rows[log].smooth.directions[j][at]);
+                moving[layout.velocities().start + j] = of(&|log, at| rows[log].smooth.qd[j][at]);
+                moving[layout.driving().start + j] = of(&|log, at| acting.tau[log][j][at]);
+                moving[layout.accelerations().start + j] =
+                    of(&|log, at| rows[log].smooth.qdd[j][at]);
+                moving[layout.directions().start + j] =
+                    of(&|log, at| rows[log].smooth.directions[j][at]);
             }
-            moving[3 * joints] = of(&|log, at| rows[log].smooth.time[at]);
-            if moving.len() > 5 * joints + 1 {
+            moving[layout.time()] = of(&|log, at| rows[log].smooth.time[at]);
+            if moving.len() > layout.parameters_of_balance() {
                 for f in 0..filters {
-                    moving[5 * joints + 1 + f] = of(&|log, at| acting.slopes[log][f][at]);
+                    moving[layout.parameters_of_balance() + f] =
+                        of(&|log, at| acting.slopes[log][f][at]);
                 }
             }
             tape.run();
@@ -176,7 +180,7 @@ impl Balance {
     ) -> Vec<(usize, Vec<f64>)> {
         let mut all: Vec<(usize, Vec<f64>)> =
             self.windows.iter().map(|&w| (w, Vec::new())).collect();
-        let first = 5 * dynamics.joints + 1;
+        let first = dynamics.layout().parameters_of_balance();
         let tape = dynamics.program.tape_with_held(first);
         self.over_rows(tape, first, values, data, |lanes, tape| {
             for (lane, (_, residuals)) in all.iter_mut().enumerate() {

@@ -1,12 +1,14 @@
-use super::levenberg_marquardt::Search;
+use super::levenberg_marquardt::LevenbergMarquardt;
 use super::outcome::{Fit, FitError, Termination};
+use super::search::{Purpose, Search};
 use super::sensitivity::Tangent;
 use super::shooting::Shooting;
+use super::solver::Solver;
 use super::values::Values;
 use crate::model::Dynamics;
 
-/// Most steps of one fit; Gauss-Newton on such problems needs 3 to 30.
-const MOST_STEPS: usize = 100;
+/// Damping of the step whose worth is predicted, as a share of the diagonal of the normal equations.
+const SCREENING_DAMPING: f64 = 1e-3;
 
 /// Most estimates of the scale after the first fit; usually two or three suffice.
 const MOST_SCALES: usize = 8;
@@ -25,25 +27,42 @@ pub fn fit(
     start_states: Vec<Vec<f64>>,
     scale: Option<f64>,
 ) -> Result<(Values, Fit), FitError> {
+    let solver = &LevenbergMarquardt::USUAL;
+    fit_by(solver, shooting, dynamics, active, start_states, scale)
+}
+
+/// As [`fit`], by any solver.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_by(
+    solver: &dyn Solver,
+    shooting: &Shooting<'_>,
+    dynamics: &Dynamics,
+    active: &[usize],
+    start_states: Vec<Vec<f64>>,
+    scale: Option<f64>,
+) -> Result<(Values, Fit), FitError> {
     let tangent = Tangent::new(dynamics, active, shooting.local(&start_states));
     let mut search = Search::new(shooting, dynamics, &tangent, start_states, scale)?;
-    let mut termination = search.run(MOST_STEPS);
+    let mut termination = solver.solve(&mut search);
     // The scale must be that of the final residuals; the smaller it is, the less the start states' estimates influence
     // them.
     for _ in 0..MOST_SCALES {
         if scale.is_some() || search.rescale() {
             break;
         }
-        termination = search.run(MOST_STEPS);
+        termination = solver.solve(&mut search);
     }
     Ok(search.finish(termination))
 }
 
-/// As [`fit`] at a given scale, if only a cost below `below` is of use; `None` if the cost does not reach it.
+/// As [`fit_by`] at a given scale, if only a cost below `below` is of use; `None` if the cost does not reach it.
 ///
 /// # Errors
 /// As [`fit`].
 pub fn fit_below(
+    solver: &dyn Solver,
     shooting: &Shooting<'_>,
     dynamics: &Dynamics,
     active: &[usize],
@@ -52,8 +71,8 @@ pub fn fit_below(
 ) -> Result<Option<(Values, Fit)>, FitError> {
     let tangent = Tangent::new(dynamics, active, shooting.local(&start_states));
     let search = Search::new(shooting, dynamics, &tangent, start_states, Some(scale))?;
-    let mut search = search.only_below(below);
-    let termination = search.run(MOST_STEPS);
+    let mut search = search.to(Purpose::Choose { below });
+    let termination = solver.solve(&mut search);
     let found = (termination != Termination::GivenUp).then(|| search.finish(termination));
     Ok(found)
 }
@@ -87,5 +106,6 @@ pub fn predicted_cost(
     let tangent = Tangent::new(dynamics, active, shooting.local(start_states));
     let start_states = start_states.to_vec();
     let search = Search::new(shooting, dynamics, &tangent, start_states, Some(scale)).ok()?;
-    search.predicted_cost()
+    let decrease = search.predicted_decrease(&search.linearised(), SCREENING_DAMPING)?;
+    Some(search.cost() - decrease)
 }

@@ -5,6 +5,7 @@
 //! differentiated, and the torque that it needs is compared with the logged one. Logged velocities are not used, since
 //! most rigs filter or delay them.
 
+mod active_set;
 mod balance;
 mod combinations;
 mod declared_body;
@@ -18,24 +19,30 @@ mod offsets;
 mod outcome;
 mod pack;
 mod prior;
+mod search;
 mod sensitivity;
 mod shooting;
+mod solver;
 mod start;
 mod sums;
 mod torques;
 mod values;
 
 pub use crate::sim::{Window, cut, initial_state};
+pub use active_set::step_within_bounds;
 pub use combinations::{Combination, IdentifiableBodies, identifiable_bodies};
 pub use distance::squared_distance;
-pub use fit::{as_it_stands, fit, fit_below, predicted_cost};
+pub use fit::{as_it_stands, fit, fit_below, fit_by, predicted_cost};
 pub use identifiability::{Identifiability, Open, identifiability, open};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, blocks_of_times, uncertainty};
+pub use levenberg_marquardt::LevenbergMarquardt;
 pub use normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
 pub use offsets::{CalibrateError, Offsets, calibrate, calibrate_first};
 pub use outcome::{Fit, FitError, Termination};
+pub use search::{Linearised, Purpose, Search, Step};
 pub use sensitivity::Local;
 pub use shooting::Shooting;
+pub use solver::Solver;
 pub use sums::huber;
 pub use torques::{TorqueFit, fit_torques};
 pub use values::{Column, Own, Values};

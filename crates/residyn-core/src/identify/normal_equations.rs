@@ -147,24 +147,19 @@ impl Eliminated {
     }
 }
 
-/// The solution with the held unknowns at zero; `None` if the matrix of the others is not positive definite or not
-/// finite.
-pub(super) fn solve_with_held(
+/// The solution for the `free` unknowns with the others at zero; `None` if the matrix of the free ones is not positive
+/// definite or not finite.
+pub(super) fn solve_part(
     matrix: &DMatrix<f64>,
     right: &DVector<f64>,
-    held: &[bool],
+    free: &[usize],
 ) -> Option<DVector<f64>> {
-    let free: Vec<usize> = (0..held.len()).filter(|&i| !held[i]).collect();
-    let mut step = DVector::zeros(held.len());
     if free.is_empty() {
-        return Some(step);
+        return Some(DVector::zeros(0));
     }
-    let part = matrix.select_rows(&free).select_columns(&free);
-    let solution = part.cholesky()?.solve(&right.select_rows(&free));
-    for (&i, value) in free.iter().zip(solution.iter()) {
-        step[i] = *value;
-    }
-    step.iter().all(|value| value.is_finite()).then_some(step)
+    let part = matrix.select_rows(free).select_columns(free);
+    let solution = part.cholesky()?.solve(&right.select_rows(free));
+    (solution.iter().all(|value| value.is_finite())).then_some(solution)
 }
 
 /// A matrix in units in which its diagonal is one, and the size of each unit; a diagonal that is not positive stays.

@@ -1,6 +1,6 @@
 use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::{Row, Simd, WithSimd};
-use crate::model::Dynamics;
+use crate::model::{Dynamics, InputLayout};
 use crate::sim::{Hold, Scheme, StepTorque};
 
 /// Windows that are integrated side by side: two AVX-512 registers or four AVX2 registers of f64.
@@ -45,9 +45,9 @@ impl Tangent {
         if local == Local::Nothing {
             return Self::of_torques(dynamics, active);
         }
-        let n = dynamics.joints;
+        let (n, layout) = (dynamics.joints, dynamics.layout());
         let mut graph = Graph::new();
-        let (moving, held) = dynamics.program.inputs().split_at(3 * n + 1);
+        let (moving, held) = dynamics.program.inputs().split_at(layout.parameters());
         let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
         let slopes = (dynamics.filters.iter())
             .map(|filter| graph.input(&format!("slope of {}", filter.parameter)))
@@ -55,17 +55,18 @@ impl Tangent {
         inputs.extend(held.iter().map(|name| graph.input(name)));
         let outputs = graph.append(&dynamics.program, &inputs);
         let accelerations = &outputs[n..];
-        let mut wrt = inputs[..2 * n].to_vec();
-        wrt.extend(active.iter().map(|&k| inputs[3 * n + 1 + k]));
+        let mut wrt = inputs[layout.states()].to_vec();
+        wrt.extend(active.iter().map(|&k| inputs[layout.parameters() + k]));
         if local == Local::StateAndForce {
-            wrt.extend(&inputs[2 * n..3 * n]);
+            wrt.extend(&inputs[layout.driving()]);
         }
         let mut jacobian = graph.jacobian(accelerations, &wrt);
         for (filter, slope) in dynamics.filters.iter().zip(slopes) {
             let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
                 continue;
             };
-            let by_torque = graph.jacobian(accelerations, &[inputs[2 * n + filter.joint.index()]]);
+            let by_torque =
+                graph.jacobian(accelerations, &[inputs[layout.driving_of(filter.joint)]]);
             for (row, by_torque) in jacobian.iter_mut().zip(by_torque) {
                 row[2 * n + column] = graph.mul(by_torque[0], slope);
             }
@@ -137,9 +138,9 @@ impl Tangent {
     /// For a torque balance: outputs are the n differences, then for each difference its derivatives with respect to
     /// the active parameters that it depends on.
     fn of_torques(dynamics: &Dynamics, active: &[usize]) -> Self {
-        let n = dynamics.joints;
+        let (n, layout) = (dynamics.joints, dynamics.layout());
         let mut graph = Graph::new();
-        let (moving, held) = dynamics.program.inputs().split_at(5 * n + 1);
+        let (moving, held) = (dynamics.program.inputs()).split_at(layout.parameters_of_balance());
         let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
         let slopes = (dynamics.filters.iter())
             .map(|filter| graph.input(&format!("slope of {}", filter.parameter)))
@@ -153,7 +154,8 @@ impl Tangent {
             let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
                 continue;
             };
-            let by_torque = graph.jacobian(&differences, &[inputs[2 * n + filter.joint.index()]]);
+            let by_torque =
+                graph.jacobian(&differences, &[inputs[layout.driving_of(filter.joint)]]);
             for (row, by_torque) in jacobian.iter_mut().zip(by_torque) {
                 row[column] = graph.mul(by_torque[0], slope);
             }
@@ -181,13 +183,16 @@ impl Tangent {
 
 /// The program of [`Tangent::reading`].
 fn reading(dynamics: &Dynamics, active: &[usize]) -> Option<Program> {
-    let n = dynamics.joints;
+    let layout = dynamics.layout();
     let mut graph = Graph::new();
     let names = dynamics.program.inputs();
     let inputs: Vec<_> = names.iter().map(|name| graph.input(name)).collect();
     let shown = graph.append(dynamics.reading.as_ref()?, &inputs);
-    let parameters: Vec<_> = active.iter().map(|&k| inputs[3 * n + 1 + k]).collect();
-    let by_state = graph.jacobian(&shown, &inputs[..2 * n]).concat();
+    let parameters: Vec<_> = active
+        .iter()
+        .map(|&k| inputs[layout.parameters() + k])
+        .collect();
+    let by_state = graph.jacobian(&shown, &inputs[layout.states()]).concat();
     let by_parameter = graph.jacobian(&shown, &parameters).concat();
     Some(graph.finish(&[shown, by_state, by_parameter].concat()))
 }
@@ -224,9 +229,12 @@ impl<'t> TangentStepper<'t> {
         let mut reading = tangent
             .reading
             .as_ref()
-            .map(|reading| reading.tape_with_held(3 * n + 1));
+            .map(|reading| reading.tape_with_held(InputLayout::of(n).parameters()));
         if let Some(reading) = &mut reading {
-            for (slot, value) in reading.inputs()[3 * n + 1..].iter_mut().zip(values) {
+            for (slot, value) in reading.inputs()[InputLayout::of(n).parameters()..]
+                .iter_mut()
+                .zip(values)
+            {
                 *slot = Row::splat(*value);
             }
         }
@@ -271,9 +279,10 @@ impl<'t> TangentStepper<'t> {
             return (angles, slopes);
         };
         let inputs = reading.moving();
-        inputs[..2 * n].copy_from_slice(state);
-        inputs[2 * n..3 * n].copy_from_slice(&tau());
-        inputs[3 * n] = time;
+        let layout = InputLayout::of(n);
+        inputs[layout.states()].copy_from_slice(state);
+        inputs[layout.driving()].copy_from_slice(&tau());
+        inputs[layout.time()] = time;
         reading.run();
         let shared = self.tangent.active.len();
         for (joint, slopes) in slopes.chunks_exact_mut(columns).enumerate() {
@@ -320,15 +329,17 @@ impl<'t> TangentStepper<'t> {
     #[inline(always)]
     fn step<S: Simd>(&mut self, simd: S, time: &Lane, h: &Lane) {
         let n = self.tangent.joints;
+        let layout = InputLayout::of(n);
         let last = self.scheme.stages.len() - 1;
         for (k, stage) in self.scheme.stages.iter().enumerate() {
             let inner = if k == 0 { &self.now } else { &self.inner };
             let inputs = self.tape.moving();
-            inputs[..2 * n].copy_from_slice(&inner[..2 * n]);
+            inputs[layout.states()].copy_from_slice(&inner[..2 * n]);
             let (mut weighed, mut reached) = (*h, *h);
             for part in 0..Lane::parts::<S>() {
                 let h = h.get(simd, part);
-                inputs[3 * n].set(part, h.mul_add(h.like(stage.time), time.get(simd, part)));
+                inputs[layout.time()]
+                    .set(part, h.mul_add(h.like(stage.time), time.get(simd, part)));
                 weighed.set(part, h * h.like(stage.weight));
                 reached.set(part, h * h.like(stage.reach));
             }
@@ -486,13 +497,14 @@ impl WithSimd for Advance<'_, '_> {
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
         let n = self.stepper.tangent.joints;
+        let layout = InputLayout::of(n);
         #[allow(clippy::cast_precision_loss)] // few substeps
         let h = Row(self.length.map(|length| length / self.substeps as f64));
         for part in 0..self.substeps {
             let (tau, slopes) = self.stepper.torque.part(n, part);
             let inputs = self.stepper.tape.moving();
-            inputs[2 * n..3 * n].copy_from_slice(tau);
-            inputs[3 * n + 1..].copy_from_slice(slopes);
+            inputs[layout.driving()].copy_from_slice(tau);
+            inputs[layout.parameters()..].copy_from_slice(slopes);
             self.stepper.step(simd, &self.time, &h);
             for lane in 0..LANES {
                 self.time[lane] += h[lane];

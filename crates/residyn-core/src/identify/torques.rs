@@ -1,7 +1,8 @@
 use super::declared_body::{PARTS, physical_parts};
-use super::fit::fit;
+use super::fit::fit_by;
 use super::outcome::{Fit, FitError};
 use super::shooting::Shooting;
+use super::solver::Solver;
 use crate::data::Log;
 use crate::model::Model;
 use crate::sim::cut;
@@ -25,6 +26,7 @@ pub struct TorqueFit<'l> {
 /// # Errors
 /// A model that gives accelerations or logs of less than two seconds, as [`FitError::NoWindow`], and those of [`fit`].
 pub fn fit_torques<'l>(
+    solver: &dyn Solver,
     model: &Model,
     declared: &Model,
     logs: &'l [Log],
@@ -42,7 +44,7 @@ pub fn fit_torques<'l>(
         let free = parameters.filter(|(_, parameter)| !parameter.fixed);
         let active: Vec<usize> = free.map(|(k, _)| k).collect();
         let start_states = shooting.initial_start_states(0);
-        let (values, fitted) = fit(&shooting, &balance, &active, start_states, None)?;
+        let (values, fitted) = fit_by(solver, &shooting, &balance, &active, start_states, None)?;
         let balance = values.put_into(&balance, logs);
         noise = shooting.left_by(&balance, &values, &fitted.start_states);
         model = model.at(&balance);

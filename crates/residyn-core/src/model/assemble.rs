@@ -4,6 +4,7 @@ use super::dynamics::{Dynamics, Parameter, PerLogValue};
 use super::effect::{Effect, Entry, PLACE, RATIO};
 use super::filter::Filter;
 use super::fitted::FittedEffect;
+use super::input_layout::InputLayout;
 use super::reader::Located;
 use super::system::{Model, Motion};
 use crate::data::{Joint, Quantity};
@@ -530,7 +531,9 @@ pub(super) fn lower(scope: &Scope, graph: &mut Graph, formula: &Located<Formula>
 
 /// The same program with its parameters as the last inputs.
 fn with_parameters_last(program: &Program, joints: usize, parameters: usize) -> Program {
-    let (moving, rest) = program.inputs().split_at(3 * joints + 1);
+    let (moving, rest) = program
+        .inputs()
+        .split_at(InputLayout::of(joints).parameters());
     let (parameters, more) = rest.split_at(parameters);
     let mut graph = Graph::new();
     let mut inputs =

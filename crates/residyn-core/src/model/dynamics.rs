@@ -4,6 +4,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::filter::Filter;
+use super::input_layout::InputLayout;
 use crate::data::{Joint, Log, Quantity};
 use crate::expr::Program;
 
@@ -122,10 +123,15 @@ impl Dynamics {
     /// What drives the model: torques or commands, as the names of the program's inputs say.
     pub fn driven_by(&self) -> Quantity {
         let commands = Joint::at(0).name(Quantity::Command.key());
-        match self.program.inputs().get(2 * self.joints) {
+        match self.program.inputs().get(self.layout().driving().start) {
             Some(name) if *name == commands => Quantity::Command,
             _ => Quantity::Torque,
         }
+    }
+
+    /// Places of the program's inputs.
+    pub fn layout(&self) -> InputLayout {
+        InputLayout::of(self.joints)
     }
 
     /// Number of states, 2n.

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::columns_in_file::columns;
 use super::drive::Drive;
 use super::effect::Effect;
+use super::input_layout::InputLayout;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Equations, Model, Motion};
 use super::{chain_in_file, effects_in_file, sections};
@@ -80,7 +81,7 @@ impl Model {
     /// Parameters and intermediates must not take the names of states, torques or each other.
     fn check_names(&self, top: &Section<'_>) -> Result<(), FileError> {
         let mut taken: Vec<String> = self.input_names();
-        taken.truncate(3 * self.joints + 1);
+        taken.truncate(InputLayout::of(self.joints).parameters());
         taken.extend(Joint::all(self.joints).map(|joint| joint.name(Quantity::Command.key())));
         let parameters = self.parameters.iter().map(|p| ("parameters", &p.name));
         let lets = self
@@ -109,7 +110,7 @@ impl Model {
         let mut names = self.input_names();
         if matches!(self.equations.motion, Motion::Chain(_)) {
             // The inertia of a body does not change as it moves.
-            names.drain(..=3 * self.joints);
+            names.drain(..InputLayout::of(self.joints).parameters());
         }
         let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
         let mut lower = |scope: &Scope, formula: &Located<Formula>| {

@@ -17,6 +17,7 @@ mod fade;
 mod file;
 mod filter;
 mod fitted;
+mod input_layout;
 mod library;
 mod network;
 mod reader;
@@ -36,6 +37,7 @@ pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
 pub use error::ModelError;
 pub use filter::{CommandFilter, Filter};
 pub use fitted::{FittedEffect, Status};
+pub use input_layout::InputLayout;
 pub use library::Library;
 pub use network::to_f32;
 pub use network::{

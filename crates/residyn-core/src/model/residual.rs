@@ -67,8 +67,8 @@ impl LayerWeights {
 /// # Errors
 /// When the network does not fit the joints of `dynamics`.
 pub fn with_residual(dynamics: &Dynamics, mlp: &MlpWeights) -> Result<Dynamics, NetworkError> {
-    let n = dynamics.joints;
-    mlp.check(n)?;
+    let layout = dynamics.layout();
+    mlp.check(dynamics.joints)?;
     let mut graph = Graph::new();
     let inputs: Vec<Node> = (dynamics.program.inputs().iter())
         .map(|name| graph.input(name))
@@ -76,9 +76,9 @@ pub fn with_residual(dynamics: &Dynamics, mlp: &MlpWeights) -> Result<Dynamics, 
     let mut outputs = graph.append(&dynamics.program, &inputs);
     let residual = mlp.write(
         &mut graph,
-        &inputs[..n],
-        &inputs[n..2 * n],
-        &inputs[2 * n..3 * n],
+        &inputs[layout.positions()],
+        &inputs[layout.velocities()],
+        &inputs[layout.driving()],
     );
     let first = outputs.len() - residual.len();
     for (output, part) in outputs[first..].iter_mut().zip(residual) {

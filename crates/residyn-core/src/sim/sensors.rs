@@ -4,6 +4,7 @@ use super::{Commands, Point};
 use crate::data::{Log, half_width_s, local_cubic};
 use crate::expr::Tape;
 use crate::lanes::Row;
+use crate::model::InputLayout;
 
 /// The position sensors of a model, for `W` trajectories: they measure the angles of the rig unless an effect, such as
 /// backlash, acts between joint and sensor.
@@ -21,7 +22,7 @@ impl<'d, const W: usize> Sensors<'d, W> {
         let reading = model.dynamics.reading.as_ref();
         let mut tape = reading.map(|reading| reading.tape());
         if let Some(tape) = &mut tape {
-            let own = &mut tape.inputs()[3 * joints + 1..];
+            let own = &mut tape.inputs()[model.dynamics.layout().parameters()..];
             for (slot, value) in own.iter_mut().zip(model.values()) {
                 *slot = Row::splat(*value);
             }
@@ -35,7 +36,7 @@ impl<'d, const W: usize> Sensors<'d, W> {
 
     /// Set the value of a parameter in one lane.
     pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
-        let first = 3 * self.joints + 1;
+        let first = InputLayout::of(self.joints).parameters();
         if let Some(tape) = &mut self.tape {
             tape.inputs()[first + parameter][lane] = value;
         }
@@ -53,10 +54,10 @@ impl<'d, const W: usize> Sensors<'d, W> {
         let Some(tape) = &mut self.tape else {
             return &state[..n];
         };
-        let inputs = tape.inputs();
-        inputs[..2 * n].copy_from_slice(state);
-        inputs[2 * n..3 * n].copy_from_slice(&tau());
-        inputs[3 * n] = time;
+        let (inputs, layout) = (tape.inputs(), InputLayout::of(n));
+        inputs[layout.states()].copy_from_slice(state);
+        inputs[layout.driving()].copy_from_slice(&tau());
+        inputs[layout.time()] = time;
         tape.run();
         for (k, shown) in self.shown.iter_mut().enumerate() {
             *shown = *tape.output(k);

@@ -1,6 +1,7 @@
 use super::{Point, Scheme};
 use crate::expr::Tape;
 use crate::lanes::{Row, Simd, WithSimd};
+use crate::model::InputLayout;
 
 /// Integration of `W` independent states of one model side by side, by one scheme.
 pub struct Stepper<'d, const W: usize> {
@@ -16,7 +17,7 @@ impl<'d, const W: usize> Stepper<'d, W> {
     pub fn new(model: impl Into<Point<'d>>, scheme: &'static Scheme) -> Self {
         let model = model.into();
         let joints = model.dynamics.joints;
-        let first = 3 * joints + 1;
+        let first = model.dynamics.layout().parameters();
         let mut tape = model.dynamics.program.tape_with_held(first);
         for (slot, value) in tape.inputs()[first..].iter_mut().zip(model.values()) {
             *slot = Row::splat(*value);
@@ -33,7 +34,7 @@ impl<'d, const W: usize> Stepper<'d, W> {
 
     /// Set the value of a parameter in one lane.
     pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
-        let first = 3 * self.joints + 1;
+        let first = InputLayout::of(self.joints).parameters();
         self.tape.inputs()[first + parameter][lane] = value;
     }
 
@@ -66,10 +67,10 @@ impl<'d, const W: usize> Stepper<'d, W> {
         time: &mut Row<f64, W>,
         h: &Row<f64, W>,
     ) {
-        let n = self.joints;
-        self.tape.moving()[..2 * n].copy_from_slice(state);
+        let layout = InputLayout::of(self.joints);
+        self.tape.moving()[layout.states()].copy_from_slice(state);
         self.sum.copy_from_slice(state);
-        self.tape.moving()[3 * n] = *time;
+        self.tape.moving()[layout.time()] = *time;
         for stage in self.scheme.stages {
             self.tape.run_on(simd);
             for (k, slope) in self.slope.iter_mut().enumerate() {
@@ -79,13 +80,13 @@ impl<'d, const W: usize> Stepper<'d, W> {
             for part in 0..Row::<f64, W>::parts::<S>() {
                 let h = h.get(simd, part);
                 let (weighed, reached) = (h * h.like(stage.weight), h * h.like(stage.reach));
-                let rows = self.sum.iter_mut().zip(&mut inputs[..2 * n]);
+                let rows = self.sum.iter_mut().zip(&mut inputs[layout.states()]);
                 for (((sum, inner), now), slope) in rows.zip(&*state).zip(&self.slope) {
                     let slope = slope.get(simd, part);
                     sum.set(part, slope.mul_add(weighed, sum.get(simd, part)));
                     inner.set(part, slope.mul_add(reached, now.get(simd, part)));
                 }
-                inputs[3 * n].set(part, time.get(simd, part) + reached);
+                inputs[layout.time()].set(part, time.get(simd, part) + reached);
             }
         }
         if self.scheme.semi_implicit {
@@ -133,10 +134,11 @@ impl<const W: usize> WithSimd for Advance<'_, '_, W> {
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
         let n = self.stepper.joints;
+        let layout = InputLayout::of(n);
         #[allow(clippy::cast_precision_loss)] // few substeps
         let h = Row(self.length.map(|length| length / self.substeps as f64));
         for tau in self.tau.chunks(n).cycle().take(self.substeps) {
-            self.stepper.tape.moving()[2 * n..3 * n].copy_from_slice(tau);
+            self.stepper.tape.moving()[layout.driving()].copy_from_slice(tau);
             self.stepper.step(simd, self.state, &mut self.time, &h);
         }
     }

@@ -1,5 +1,5 @@
 use residyn_core::expr::{Graph, Node, Program};
-use residyn_core::model::{Dynamics, MlpWeights, Parameter, nothing_but};
+use residyn_core::model::{Dynamics, InputLayout, MlpWeights, Parameter, nothing_but};
 
 /// A hybrid model without its learnable numbers: declared equations and networks, and one program, with its derivative,
 /// for everything but the networks.
@@ -109,12 +109,9 @@ impl Builder {
     }
 
     fn features(&mut self, network: &MlpWeights) -> Vec<Node> {
-        let n = self.joints;
-        let (q, qd, tau) = (
-            &self.inputs[..n],
-            &self.inputs[n..2 * n],
-            &self.inputs[2 * n..3 * n],
-        );
+        let layout = InputLayout::of(self.joints);
+        let [q, qd, tau] = [layout.positions(), layout.velocities(), layout.driving()]
+            .map(|places| &self.inputs[places]);
         network.features(&mut self.graph, q, qd, tau)
     }
 }
@@ -122,7 +119,9 @@ impl Builder {
 /// The derivatives of a program by states and free parameters, and by the latter alone.
 fn adjoints(program: &Program, joints: usize, parameters: &[Parameter]) -> (Program, Program) {
     let mut graph = Graph::new();
-    let (of_point, of_parameters) = program.inputs().split_at(3 * joints + 1);
+    let (of_point, of_parameters) = program
+        .inputs()
+        .split_at(InputLayout::of(joints).parameters());
     let mut inputs: Vec<Node> = of_point.iter().map(|name| graph.input(name)).collect();
     let seeds: Vec<Node> = (0..program.output_count())
         .map(|k| graph.input(&format!("by output {k}")))

@@ -8,7 +8,7 @@ use crate::closeloop::problem::Problem;
 use crate::closeloop::select::Rival;
 use crate::closeloop::settings::{DiscriminateSettings, Settings};
 use crate::data::{Joint, Log};
-use crate::identify::{Fit, Shooting, Values, fit, uncertainty};
+use crate::identify::{Fit, Shooting, Solver, Values, fit_by, uncertainty};
 use crate::model::{Dynamics, FittedEffect, Model};
 
 /// One of two explanations.
@@ -61,12 +61,18 @@ impl Hypothesis {
 
     /// Fit to a record, with every parameter free that the file does not fix: an experiment may determine parameters
     /// that the present logs do not.
-    fn refit(&self, shooting: &Shooting<'_>, start_states: Vec<Vec<f64>>) -> Option<(Values, Fit)> {
+    fn refit(
+        &self,
+        solver: &dyn Solver,
+        shooting: &Shooting<'_>,
+        start_states: Vec<Vec<f64>>,
+    ) -> Option<(Values, Fit)> {
         let parameters = &self.dynamics.parameters;
         let active: Vec<usize> = (0..parameters.len())
             .filter(|&k| !parameters[k].fixed)
             .collect();
-        fit(
+        fit_by(
+            solver,
             shooting,
             &self.dynamics,
             &active,
@@ -131,7 +137,7 @@ impl<'a> Comparison<'a> {
         let present = truth.simulate(problem, &motions)?;
         let shooting =
             Shooting::new(&present.logs, present.windows.clone(), &noise).with_free_starts();
-        let (values, found) = other.refit(&shooting, present.starts(0..))?;
+        let (values, found) = other.refit(problem.solver, &shooting, present.starts(0..))?;
         let loss = loss_of(&found);
         let windows = problem.shooting.windows.iter();
         let all_s: f64 = windows.map(|w| w.duration_s(problem.logs)).sum();
@@ -204,7 +210,7 @@ impl<'a> Comparison<'a> {
             Shooting::new(&both.logs, both.windows.clone(), &self.noise).with_free_starts();
         let present = self.start_states.len();
         let start_states = [self.start_states.clone(), both.starts(present..)].concat();
-        let (values, found) = other.refit(&shooting, start_states)?;
+        let (values, found) = other.refit(self.problem.solver, &shooting, start_states)?;
         let duration_s = both.duration_s(present..);
         let rate = (loss_of(&found) - self.loss).max(0.0) / duration_s;
         let differences = differences(&shooting, &other, &values, &found.start_states, present);

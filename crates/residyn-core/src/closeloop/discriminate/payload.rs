@@ -45,10 +45,8 @@ impl Payload {
         let mut inputs: Vec<_> = (dynamics.program.inputs().iter())
             .map(|name| graph.input(name))
             .collect();
-        let (time, parameter) = (
-            3 * dynamics.joints,
-            3 * dynamics.joints + 1 + self.parameter,
-        );
+        let layout = dynamics.layout();
+        let (time, parameter) = (layout.time(), layout.parameters() + self.parameter);
         let switch = graph.constant(0.5 * self.delay_s);
         let carried = graph.binary(Binary::Less, switch, inputs[time]);
         for (input, change) in [(time, -self.delay_s), (parameter, self.extra)] {

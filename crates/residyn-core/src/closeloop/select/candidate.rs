@@ -6,7 +6,8 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::data::Joint;
 use crate::identify::{
-    Column, Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, with_unit_diagonal,
+    Column, Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, step_within_bounds,
+    with_unit_diagonal,
 };
 use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect};
 
@@ -218,28 +219,20 @@ fn best_by_switches(
 
 /// The minimum of the quadratic cost over some free values; values at a bound that would leave it are held.
 fn least_cost(dynamics: &Dynamics, fit: &Fit, all: &WindowTerms, own: &[usize]) -> Option<f64> {
-    let mut free = own.to_vec();
-    loop {
-        let matrix = all.hessian.select_rows(&free).select_columns(&free);
-        let gradient = all.gradient.select_rows(&free);
+    let solve = |free: &[usize]| {
+        let matrix = all.hessian.select_rows(free).select_columns(free);
         let (mut scaled, unit) = with_unit_diagonal(&matrix);
         (0..unit.len()).for_each(|i| scaled[(i, i)] += 1e-9);
-        let step = -scaled
-            .cholesky()?
-            .solve(&gradient.component_mul(&unit))
-            .component_mul(&unit);
-        let stopped = (0..free.len()).find(|&i| {
-            let parameter = &dynamics.parameters[fit.columns[free[i]].parameter];
-            let [low, high] = parameter.bounds;
-            parameter.value <= low && step[i] < 0.0 || parameter.value >= high && step[i] > 0.0
-        });
-        match stopped {
-            Some(i) => {
-                free.remove(i);
-            }
-            None => return Some(0.5 * gradient.dot(&step)),
-        }
-    }
+        let right = all.gradient.select_rows(free).component_mul(&unit);
+        Some(-scaled.cholesky()?.solve(&right).component_mul(&unit))
+    };
+    let leaves = |i: usize, step: f64| {
+        let parameter = &dynamics.parameters[fit.columns[i].parameter];
+        let [low, high] = parameter.bounds;
+        parameter.value <= low && step < 0.0 || parameter.value >= high && step > 0.0
+    };
+    let (free, step) = step_within_bounds(own.to_vec(), solve, leaves)?;
+    Some(0.5 * all.gradient.select_rows(&free).dot(&step))
 }
 
 /// Whether some parameter value switches the effect off, so that it can start from absent.

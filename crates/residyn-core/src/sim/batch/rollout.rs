@@ -2,8 +2,7 @@ use super::memory::Memory;
 use super::{Network, Rows, W};
 use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
-use crate::model::to_f32;
-use crate::model::{Dynamics, MlpWeights};
+use crate::model::{Dynamics, InputLayout, MlpWeights, to_f32};
 use crate::sim::Integrator;
 
 /// Model, objective and integrator, compiled for rollouts from one state under many input sequences.
@@ -138,9 +137,9 @@ pub fn added(joints: usize, networks: &[MlpWeights]) -> Vec<Added> {
 
 /// One program for the equations, the reward and the networks' features, so that they share their sines and cosines.
 fn whole(equations: &Dynamics, networks: &[MlpWeights], objective: &Program) -> Program {
-    let n = equations.joints;
+    let (n, layout) = (equations.joints, equations.layout());
     let mut graph = Graph::new();
-    let (moving, parameters) = equations.program.inputs().split_at(3 * n + 1);
+    let (moving, parameters) = equations.program.inputs().split_at(layout.parameters());
     let mut write =
         |names: &[String]| -> Vec<Node> { names.iter().map(|name| graph.input(name)).collect() };
     let moving = write(moving);
@@ -148,13 +147,18 @@ fn whole(equations: &Dynamics, networks: &[MlpWeights], objective: &Program) -> 
     let (until_now, parameters) = (write(&until_now), write(parameters));
     let inputs = [moving.as_slice(), &parameters].concat();
     let mut outputs = graph.append(&equations.program, &inputs);
-    let seen = [&moving[..2 * n], &until_now, &moving[3 * n..]].concat();
+    let seen = [
+        &moving[layout.states()],
+        &until_now,
+        &moving[layout.time()..],
+    ]
+    .concat();
     let reward = graph.append(objective, &seen);
     assert_eq!(reward.len(), 1, "an objective is one number");
     outputs.extend(reward);
     for network in networks {
-        let (q, qd) = moving[..2 * n].split_at(n);
-        outputs.extend(network.features(&mut graph, q, qd, &moving[2 * n..3 * n]));
+        let (q, qd) = moving[layout.states()].split_at(n);
+        outputs.extend(network.features(&mut graph, q, qd, &moving[layout.driving()]));
     }
     graph.finish(&outputs)
 }
@@ -234,6 +238,7 @@ impl WithSimd for Run<'_, '_> {
             step_s,
             ..
         } = *block.rollouts;
+        let layout = InputLayout::of(n);
         let (stages, substeps) = (integrator.scheme().stages, integrator.substeps());
         let (steps, h) = (inputs.len() / n, step_s / substeps as f32);
         for (row, value) in block.next.iter_mut().zip(start) {
@@ -248,7 +253,7 @@ impl WithSimd for Run<'_, '_> {
                 for (k, stage) in stages.iter().enumerate() {
                     let [time, reach, weight] =
                         [stage.time, stage.reach, stage.weight].map(|share| share as f32 * h);
-                    block.tape.moving()[3 * n] = Rows::splat(begin_s + time);
+                    block.tape.moving()[layout.time()] = Rows::splat(begin_s + time);
                     block.tape.run_on(simd);
                     if k == 0 && substep == 0 && step > 0 {
                         add(simd, returns, block.tape.output(2 * n), 1.0);
@@ -270,12 +275,13 @@ impl Block<'_> {
     #[inline(always)]
     fn hold(&mut self, inputs: &[Rows], acting: &[Rows], step: usize) {
         let n = self.rollouts.joints;
+        let layout = InputLayout::of(n);
         let slots = self.tape.moving();
         if let Some(now) = acting[step * n..].get(..n) {
-            slots[2 * n..3 * n].copy_from_slice(now);
+            slots[layout.driving()].copy_from_slice(now);
         }
         if step > 0 {
-            slots[3 * n + 1..].copy_from_slice(&inputs[(step - 1) * n..][..n]);
+            slots[layout.parameters()..].copy_from_slice(&inputs[(step - 1) * n..][..n]);
         }
     }
 
