@@ -14,6 +14,7 @@ use residyn_control::control::{
 };
 use residyn_control::plan::Method;
 use residyn_core::data::statistics::{mean, sample_deviation};
+use residyn_core::data::{Joint, Log};
 use residyn_core::model::Library;
 use residyn_core::plant::{Noise, Plant};
 use residyn_core::streams::{Purpose, stream};
@@ -21,7 +22,7 @@ use residyn_io::files::write_whole;
 use residyn_io::read_model;
 use residyn_io::runs::RunFolder;
 use residyn_io::{read_plant, write_log};
-use residyn_plot::{Film, film};
+use residyn_plot::{JointKind, Panel, PlotError, Role, Track, predictions};
 use residyn_train::Checkpoint;
 
 /// Control a simulated plant by model-predictive control with any model
@@ -56,7 +57,7 @@ pub(super) struct Arguments {
     /// Standard deviations of the sensors' noise: position and velocity
     #[arg(long, num_args = 2, value_name = "NUMBER")]
     noise: Option<Vec<f64>>,
-    /// Folder for each episode as a log and, if the task has a figure, as a film (SVG)
+    /// Folder for each episode as a log and as a plot of its positions (SVG)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -95,10 +96,15 @@ struct Entry {
     /// When plans were made whose candidates all diverged, in s.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lost_s: Vec<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    log: Option<PathBuf>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    film: Option<PathBuf>,
+    /// With an output folder.
+    #[serde(flatten)]
+    files: Option<Files>,
+}
+
+#[derive(Serialize)]
+struct Files {
+    log: PathBuf,
+    plot: PathBuf,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
@@ -239,7 +245,7 @@ fn one(
             deciding,
         } = timed;
         let decisions = controller.decisions();
-        let (log, film) = written(arguments, task, &episode, number)?;
+        let files = written(arguments, plant, task, &episode, number)?;
         Ok(Entry {
             total: episode.total(),
             success: episode.success,
@@ -247,24 +253,24 @@ fn one(
             ms_per_decision: 1e3 * deciding.as_secs_f64() / decisions as f64,
             diverged: controller.diverged(),
             lost_s: controller.lost().to_vec(),
-            log,
-            film,
+            files,
         })
     })
 }
 
-/// Write the episode if an output folder is given; returns the names of its files.
+/// Write the episode if an output folder is given.
 fn written(
     arguments: &Arguments,
+    plant: &Plant,
     task: &Task,
     episode: &Episode,
     number: usize,
-) -> Result<(Option<PathBuf>, Option<PathBuf>)> {
+) -> Result<Option<Files>> {
     let Some(out) = &arguments.out else {
-        return Ok((None, None));
+        return Ok(None);
     };
     let name = |ending: &str| out.join(format!("episode-{number:03}.{ending}"));
-    let log = name("csv");
+    let [log, plot] = ["csv", "svg"].map(name);
     write_log(&episode.stretch.log, &log)?;
     let title = format!(
         "{} on {}: return {:.1}",
@@ -272,19 +278,28 @@ fn written(
         arguments.plant.display(),
         episode.total()
     );
-    if task.figure.is_empty() {
-        return Ok((Some(log), None));
-    }
-    let picture = film(Film {
-        title,
-        step_s: task.step_s,
-        figure: task.figure_of(episode),
-        torques: &episode.stretch.log.tau,
-        rewards: &episode.rewards,
-    })?;
-    let film = name("svg");
-    write_whole(&film, picture.as_bytes())?;
-    Ok((Some(log), Some(film)))
+    write_whole(
+        &plot,
+        positions(plant, &episode.stretch.log, &title)?.as_bytes(),
+    )?;
+    Ok(Some(Files { log, plot }))
+}
+
+/// The joints' positions over time, as SVG text.
+fn positions(plant: &Plant, log: &Log, title: &str) -> Result<String, PlotError> {
+    let points = |joint: Joint| log.time.iter().copied().zip(log.q[joint].iter().copied());
+    let panel = |joint: Joint| Panel {
+        label: plant.system.joint_label(joint),
+        quantity: format!("position q{joint}"),
+        unit: JointKind::of(plant.system.prismatic[joint]).position_unit(),
+        tracks: vec![Track {
+            label: "measured".to_owned(),
+            role: Role::Measured,
+            segments: vec![points(joint).collect()],
+        }],
+    };
+    let panels: Vec<Panel> = Joint::all(log.q.len()).map(panel).collect();
+    predictions(&panels, title)
 }
 
 /// A controller that measures the time of its decisions.
@@ -339,7 +354,7 @@ fn table(printed: &Printed) -> String {
         );
     }
     for e in &printed.episodes {
-        for file in e.log.iter().chain(&e.film) {
+        for file in e.files.iter().flat_map(|files| [&files.log, &files.plot]) {
             let _ = writeln!(out, "{}", file.display());
         }
     }

@@ -56,7 +56,7 @@ const OTHERS: &[(&str, &str)] = &[
     ),
     ("html", "reports for a browser, out"),
     ("markdown", "reports, out"),
-    ("svg", "plots and films of episodes, out"),
+    ("svg", "plots, out"),
     ("jsonl", "rounds of the learning loop, in and out"),
     ("tfevents", "scalars for TensorBoard, out"),
 ];

@@ -124,20 +124,10 @@ pub(crate) fn rule(from: (f64, f64), to: (f64, f64), colour: &str) -> Line {
 }
 
 /// Path data of an open line.
-pub(crate) fn line_data(points: &[(f64, f64)]) -> String {
+fn line_data(points: &[(f64, f64)]) -> String {
     let mut data = String::new();
     for (index, point) in points.iter().enumerate() {
         push(&mut data, if index == 0 { 'M' } else { 'L' }, *point);
-    }
-    data
-}
-
-/// Path data of zero-length strokes.
-pub(crate) fn dots_data(points: impl IntoIterator<Item = (f64, f64)>) -> String {
-    let mut data = String::new();
-    for point in points {
-        push(&mut data, 'M', point);
-        data.push_str("h0");
     }
     data
 }
@@ -169,8 +159,13 @@ pub(crate) fn dots(
     diameter: f64,
     colour: &str,
 ) -> Path {
+    let mut data = String::new();
+    for point in points {
+        push(&mut data, 'M', point);
+        data.push_str("h0");
+    }
     Path::new()
-        .set("d", dots_data(points))
+        .set("d", data)
         .set("fill", "none")
         .set("stroke", colour)
         .set("stroke-width", diameter)

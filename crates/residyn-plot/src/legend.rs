@@ -38,7 +38,7 @@ impl Entry {
     }
 }
 
-/// Begins a figure of some panels as [`with_key`] does.
+/// Begins a figure of some panels: a canvas with a title and a key, each entry once, and where these end.
 ///
 /// # Errors
 /// No panel.
@@ -52,13 +52,8 @@ pub(crate) fn begin<P>(
             title: title.to_owned(),
         });
     }
-    Ok(with_key(title, entries(panels)))
-}
-
-/// A canvas with a title and a key, each entry once, and where these end.
-pub(crate) fn with_key(title: &str, entries: Vec<Entry>) -> (Canvas, f64) {
     let mut once: Vec<Entry> = Vec::new();
-    for entry in entries {
+    for entry in entries(panels) {
         if !once.contains(&entry) {
             once.push(entry);
         }
@@ -66,7 +61,7 @@ pub(crate) fn with_key(title: &str, entries: Vec<Entry>) -> (Canvas, f64) {
     let mut canvas = Canvas::new(title);
     let (key, end) = legend(&once, canvas.top);
     canvas.add(key);
-    (canvas, end)
+    Ok((canvas, end))
 }
 
 /// Draws the entries from `top` down, and returns where they end.

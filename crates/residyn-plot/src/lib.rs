@@ -12,7 +12,6 @@ mod axes;
 mod canvas;
 mod decimate;
 mod error_bars;
-mod film;
 mod learning;
 mod legend;
 mod predictions;
@@ -23,7 +22,6 @@ mod style;
 pub use axes::Quantity;
 pub use decimate::{bends, decimate};
 pub use error_bars::{Bar, ErrorRow, error_bars};
-pub use film::{Film, film};
 pub use learning::{Course, LearningPanel, Method, MethodCurve, Spread, learning_curves};
 pub use predictions::{Panel, Track, predictions};
 pub use residual_shape::{ShapeCurve, ShapeModel, ShapePanel, ShapeSample, residual_shape};
@@ -39,16 +37,6 @@ pub enum PlotError {
         /// The title that the figure would have had.
         title: String,
     },
-    /// Frames of an animation that do not belong together.
-    #[error(
-        "animation {title:?}: chain {chain} changes its number of points, or its number of frames differs from that of chain 1; give every frame of a chain the same points, and every chain the same frames"
-    )]
-    Uneven {
-        /// The animation's title.
-        title: String,
-        /// The chain, from 1.
-        chain: usize,
-    },
 }
 
 /// How a joint moves: fixes the units on the axes.
@@ -61,6 +49,14 @@ pub enum JointKind {
 }
 
 impl JointKind {
+    /// The kind of a joint that slides, or of one that turns.
+    pub fn of(slides: bool) -> Self {
+        match slides {
+            true => Self::Prismatic,
+            false => Self::Revolute,
+        }
+    }
+
     /// Unit of the joint's position.
     pub fn position_unit(self) -> &'static str {
         match self {

@@ -76,15 +76,6 @@ impl Range {
         }
     }
 
-    /// Of the given width, around the same middle.
-    pub fn around_middle(self, width: f64) -> Self {
-        let middle = f64::midpoint(self.lo, self.hi);
-        Self {
-            lo: middle - width / 2.0,
-            hi: middle + width / 2.0,
-        }
-    }
-
     /// A range that an axis can show: a range whose width is zero or lost in rounding is widened around its value.
     pub fn drawable(self) -> Self {
         let [lo, hi] = [self.lo, self.hi].map(|end| end.clamp(-FARTHEST, FARTHEST));

@@ -94,11 +94,7 @@ fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
 }
 
 fn kind(outcome: &Outcome, joint: Joint) -> JointKind {
-    if outcome.given.prismatic[joint] {
-        JointKind::Prismatic
-    } else {
-        JointKind::Revolute
-    }
+    JointKind::of(outcome.given.prismatic[joint])
 }
 
 /// The points of a curve along a log that are shown.

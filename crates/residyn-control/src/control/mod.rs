@@ -2,7 +2,6 @@
 
 mod controller;
 mod episode;
-mod figure;
 mod predictor;
 mod session;
 mod task;

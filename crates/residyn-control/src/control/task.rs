@@ -44,9 +44,6 @@ pub struct Task {
     pub goal: Goal,
     #[serde(default)]
     pub plant: PlantSettings,
-    /// Drawing of the mechanism: lines through points x, y in m, each a formula of the state.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub figure: Vec<Vec<[String; 2]>>,
     /// Where it was read from.
     #[serde(skip)]
     pub path: PathBuf,
@@ -282,15 +279,11 @@ impl Task {
                 self.goal.hold_s
             ));
         }
-        let points = self.figure.iter().flatten().flatten();
         let formulas = [
             ("objective", &self.objective),
             ("goal.formula", &self.goal.formula),
         ];
-        for (name, formula) in formulas
-            .into_iter()
-            .chain(points.map(|formula| ("figure", formula)))
-        {
+        for (name, formula) in formulas {
             Objective::new(formula, n).map_err(|error| format!("`{name}`: {error}"))?;
         }
         Ok(())
