@@ -58,7 +58,6 @@ const OTHERS: &[(&str, &str)] = &[
     ("markdown", "reports, out"),
     ("svg", "plots, out"),
     ("jsonl", "rounds of the learning loop, in and out"),
-    ("tfevents", "scalars for TensorBoard, out"),
 ];
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {

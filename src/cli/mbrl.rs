@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::Instant;
 
 use anyhow::Result;
 use clap::Args;
@@ -11,7 +11,6 @@ use super::{Answer, Common, inputs, interrupt, progress, terminal};
 use residyn_experiments::experiment::{Config, FinishedRound, Session};
 use residyn_experiments::mbrl::Round;
 use residyn_io::runs::RunFolder;
-use residyn_report::EventFile;
 
 /// Model-based reinforcement learning: train a model, control the plant with it, add the new data, repeat
 ///
@@ -31,9 +30,6 @@ pub(super) struct Arguments {
     /// Folder for rounds.jsonl, the recorded motion as logs, and the last model as a checkpoint
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Folder for a TensorBoard event file of the rounds that this command carries out
-    #[arg(long, value_name = "DIR")]
-    tensorboard: Option<PathBuf>,
     #[command(flatten)]
     effects: inputs::Effects,
     #[command(flatten)]
@@ -45,72 +41,38 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         config,
         method,
         out,
-        tensorboard,
         effects,
         common,
     } = arguments;
     let folder = RunFolder::open(out)?;
     let library = effects.library()?;
     let session = Session::open(Config::read(config)?, &library, common.device, common.seed)?;
-    let events = match tensorboard {
-        Some(folder) => Some(Mutex::new(EventFile::create(folder, now_s())?)),
-        None => None,
-    };
     let rounds = Mutex::new(Vec::new());
-    let failed = Mutex::new(None);
     let begun = Instant::now();
     let bar = progress::bar(session.rounds_of(method));
     let _orderly = interrupt::counted(&folder, &bar, "rounds");
     let ended = session.run_alone(method, &folder, &|step: &FinishedRound<'_>| {
         bar.inc(1);
         bar.set_message(message(step));
-        locked(&rounds).push(step.round.clone());
-        if let (Some(events), false) = (&events, step.found)
-            && let Err(error) = tell(&mut locked(events), step.round)
-        {
-            *locked(&failed) = Some(error);
-        }
+        let mut rounds = rounds
+            .lock()
+            .expect("nothing panics while it holds the lock");
+        rounds.push(step.round.clone());
     });
     bar.finish_and_clear();
     terminal::took("rounds", begun);
     let checkpoint = ended?;
-    if let Some(error) = locked(&failed).take() {
-        return Err(error);
-    }
-    let rounds = locked(&rounds);
+    let rounds = rounds
+        .into_inner()
+        .expect("nothing panics while it holds the lock");
     if common.json {
-        let value = json!({"schema": 1, "out": out, "seed": common.seed, "method": method, "rounds": *rounds});
+        let value = json!({"schema": 1, "out": out, "seed": common.seed, "method": method, "rounds": rounds});
         terminal::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
     } else {
         let headline = format!("checkpoint: {}", checkpoint.display());
         terminal::answer(headline, &table(&rounds, &checkpoint))?;
     }
     Ok(Answer::Yes)
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner)
-}
-
-/// Seconds since 1970, as in event files.
-fn now_s() -> f64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0.0, |since| since.as_secs_f64())
-}
-
-fn tell(events: &mut EventFile, round: &Round) -> Result<()> {
-    let step = i64::try_from(round.transitions)?;
-    let mut scalar = |tag: &str, value: f64| events.scalar(tag, step, now_s(), value);
-    scalar("return", round.score.total)?;
-    scalar("success", f64::from(u8::from(round.score.success)))?;
-    scalar("prediction error", round.error)?;
-    scalar("residual norm", round.residual_norm)?;
-    for (name, value) in &round.parameters {
-        scalar(&format!("parameter/{name}"), *value)?;
-    }
-    Ok(())
 }
 
 fn table(rounds: &[Round], checkpoint: &Path) -> String {

@@ -17,7 +17,6 @@ mod picture;
 mod plot_data;
 mod schema;
 mod summary;
-mod tensorboard;
 mod text;
 mod wording;
 
@@ -26,5 +25,4 @@ pub use model_file::model_file;
 pub use page::{ResultsPage, page};
 pub use schema::{Report, schema};
 pub use summary::{Words, answer, curves, summary};
-pub use tensorboard::EventFile;
 pub use text::text;
