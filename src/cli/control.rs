@@ -290,8 +290,7 @@ fn positions(plant: &Plant, log: &Log, title: &str) -> Result<String, PlotError>
     let points = |joint: Joint| log.time.iter().copied().zip(log.q[joint].iter().copied());
     let panel = |joint: Joint| Panel {
         label: plant.system.joint_label(joint),
-        quantity: format!("position q{joint}"),
-        unit: JointKind::of(plant.system.prismatic[joint]).position_unit(),
+        quantity: JointKind::of(plant.system.prismatic[joint]).position(joint),
         tracks: vec![Track {
             label: "measured".to_owned(),
             role: Role::Measured,

@@ -1,6 +1,6 @@
 //! A pair of axes with grid, numbers and labels.
 
-use svg::node::element::Group;
+use svg::node::element::{Group, Text};
 
 use super::canvas::{Anchor, Area, TO_BASELINE, rule, text, text_width};
 use super::scale::{Range, Scale, Ticks, scaled_unit};
@@ -26,10 +26,10 @@ pub struct Quantity {
 
 impl Quantity {
     /// A quantity with its unit, which is empty for a plain number.
-    pub fn new(name: &str, unit: &str) -> Self {
+    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
         Self {
-            name: name.to_owned(),
-            unit: unit.to_owned(),
+            name: name.into(),
+            unit: unit.into(),
         }
     }
 }
@@ -44,18 +44,12 @@ pub(crate) struct Axis {
 
 impl Axis {
     /// An axis of the given length in pixels from left to right, its numbers clear of one another.
-    pub fn horizontal(range: Range, pixels: f64, quantity: &str, unit: &str) -> Self {
-        Self::horizontal_on(Scale::Linear, range, pixels, quantity, unit)
+    pub fn horizontal(range: Range, pixels: f64, quantity: &Quantity) -> Self {
+        Self::horizontal_on(Scale::Linear, range, pixels, quantity)
     }
 
     /// A horizontal axis on a scale of choice.
-    pub fn horizontal_on(
-        scale: Scale,
-        range: Range,
-        pixels: f64,
-        quantity: &str,
-        unit: &str,
-    ) -> Self {
+    pub fn horizontal_on(scale: Scale, range: Range, pixels: f64, quantity: &Quantity) -> Self {
         let mut wanted = (pixels / X_TICK_PX).max(2.0) as usize;
         let mut ticks = scale.ticks(range, wanted);
         while wanted > 2
@@ -64,13 +58,13 @@ impl Axis {
             wanted -= 1;
             ticks = scale.ticks(range, wanted);
         }
-        Self::labelled(scale, range, ticks, quantity, unit)
+        Self::labelled(scale, range, ticks, quantity)
     }
 
     /// An axis of the given length in pixels from bottom to top.
-    pub fn vertical(range: Range, pixels: f64, quantity: &str, unit: &str) -> Self {
+    pub fn vertical(range: Range, pixels: f64, quantity: &Quantity) -> Self {
         let ticks = Ticks::new(range, (pixels / Y_TICK_PX).max(2.0) as usize);
-        Self::labelled(Scale::Linear, range, ticks, quantity, unit)
+        Self::labelled(Scale::Linear, range, ticks, quantity)
     }
 
     /// An axis along which things are lined up rather than measured.
@@ -88,10 +82,15 @@ impl Axis {
         }
     }
 
-    fn labelled(scale: Scale, range: Range, ticks: Ticks, quantity: &str, unit: &str) -> Self {
+    fn labelled(
+        scale: Scale,
+        range: Range,
+        ticks: Ticks,
+        Quantity { name, unit }: &Quantity,
+    ) -> Self {
         let label = match scaled_unit(unit, ticks.exponent).trim() {
-            "" => quantity.to_owned(),
-            unit => format!("{quantity} ({unit})"),
+            "" => name.clone(),
+            unit => format!("{name} ({unit})"),
         };
         Self {
             range,
@@ -186,8 +185,8 @@ impl Frame<'_> {
         ))
     }
 
-    /// Numbers of the left side.
-    pub fn y_numbers(&self) -> Group {
+    /// Numbers of the left side, and its label upright along them.
+    pub fn y_labels(&self) -> Group {
         let x = self.area.x;
         let mut labels = Group::new();
         for (value, label) in self.y.ticks.values.iter().zip(&self.y.ticks.labels) {
@@ -200,33 +199,39 @@ impl Frame<'_> {
                 TEXT_SIZE,
             ));
         }
-        labels
+        let edge = x - self.y.gutter() + TEXT_SIZE;
+        let middle = self.area.y + self.area.height / 2.0;
+        let turned = format!("translate({edge:.1} {middle:.1}) rotate(-90)");
+        let label = text(&self.y.label, 0.0, 0.0, Anchor::Middle, TEXT_SIZE);
+        labels.add(label.set("transform", turned))
     }
 
-    /// Label of the left side, upright along it.
-    pub fn y_label(&self) -> Group {
-        let x = self.area.x - self.y.gutter() + TEXT_SIZE;
-        let middle = self.area.y + self.area.height / 2.0;
-        let turned = format!("translate({x:.1} {middle:.1}) rotate(-90)");
-        let label = text(&self.y.label, 0.0, 0.0, Anchor::Middle, TEXT_SIZE);
-        Group::new().set("transform", turned).add(label)
+    /// A remark that some points lie outside, or that there are none.
+    pub fn hidden(&self, points: impl Iterator<Item = (f64, f64)>, how: &str) -> Option<Text> {
+        let inside: Vec<bool> = points.map(|point| self.holds(point)).collect();
+        let outside = inside.iter().filter(|is_inside| !**is_inside).count();
+        match (inside.len(), outside) {
+            (0, _) => Some(no_data(self.area)),
+            (_, 0) => None,
+            (total, _) => Some(remark(self.area, &format!("{outside} of {total} {how}"))),
+        }
     }
 }
 
 /// What a frame shows, above its left corner.
-pub(crate) fn heading(area: Area, content: &str) -> svg::node::element::Text {
+pub(crate) fn heading(area: Area, content: &str) -> Text {
     text(content, area.x, area.y - 8.0, Anchor::Start, TEXT_SIZE)
         .set("font-weight", "bold")
         .set("fill", INK)
 }
 
 /// A remark above a frame's right corner.
-pub(crate) fn remark(area: Area, content: &str) -> svg::node::element::Text {
+pub(crate) fn remark(area: Area, content: &str) -> Text {
     text(content, area.right(), area.y - 8.0, Anchor::End, SMALL_SIZE).set("fill", FAINT_INK)
 }
 
 /// The text in a frame without data.
-pub(crate) fn no_data(area: Area) -> svg::node::element::Text {
+pub(crate) fn no_data(area: Area) -> Text {
     let (x, y) = (area.x + area.width / 2.0, area.y + area.height / 3.0);
     text("no data", x, y, Anchor::Middle, TEXT_SIZE).set("fill", FAINT_INK)
 }

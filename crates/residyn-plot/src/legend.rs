@@ -110,3 +110,17 @@ fn sample(sample: Sample, x: f64, y: f64) -> Group {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::begin;
+
+    #[test]
+    fn a_figure_of_nothing_is_an_error() {
+        let Err(error) = begin::<()>("none", &[], |_| Vec::new()) else {
+            panic!("a figure without a panel");
+        };
+        let message = error.to_string();
+        assert!(message.contains("\"none\"") && message.contains("at least one panel"));
+    }
+}

@@ -28,6 +28,8 @@ pub use residual_shape::{ShapeCurve, ShapeModel, ShapePanel, ShapeSample, residu
 pub use scale::Scale;
 pub use style::Role;
 
+use residyn_core::data::Joint;
+
 /// A figure that cannot be drawn.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PlotError {
@@ -87,6 +89,22 @@ impl JointKind {
             Self::Revolute => "N m",
             Self::Prismatic => "N",
         }
+    }
+
+    /// A joint's position along an axis.
+    pub fn position(self, joint: Joint) -> Quantity {
+        Quantity::new(format!("position q{joint}"), self.position_unit())
+    }
+
+    /// A joint's velocity along an axis.
+    pub fn velocity(self, joint: Joint) -> Quantity {
+        Quantity::new(format!("velocity qd{joint}"), self.velocity_unit())
+    }
+
+    /// The generalised force on a joint along an axis.
+    pub fn force(self, joint: Joint) -> Quantity {
+        let name = format!("{} tau{joint}", self.force_name());
+        Quantity::new(name, self.force_unit())
     }
 }
 

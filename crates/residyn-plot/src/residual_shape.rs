@@ -2,7 +2,7 @@
 
 use svg::node::element::SVG;
 
-use super::axes::{Axis, FOOT, Frame, HEAD, heading, no_data, remark};
+use super::axes::{Axis, FOOT, Frame, HEAD, Quantity, heading};
 use super::canvas::{Area, Canvas, clipped, curves, dots, filled, rule};
 use super::legend::{Entry, Sample, begin};
 use super::scale::Range;
@@ -67,12 +67,6 @@ struct Shown<'a> {
     curve: Option<&'a ShapeCurve>,
 }
 
-/// What a panel in a row shows along its lower side.
-struct Column {
-    quantity: String,
-    unit: &'static str,
-}
-
 /// Draws one row per joint: residual force against position, velocity, torque and time.
 ///
 /// The axes cover the middle 98 % of the values; a remark counts the points outside. Large scatters are thinned
@@ -94,24 +88,21 @@ fn entries(panels: &[ShapePanel]) -> Vec<Entry> {
     points.chain([band]).collect()
 }
 
-fn columns(panel: &ShapePanel) -> [Column; 4] {
-    let ShapePanel { joint, kind, .. } = panel;
-    let column = |quantity: String, unit| Column { quantity, unit };
+/// What the panels of a row show along their lower sides.
+fn columns(&ShapePanel { joint, kind, .. }: &ShapePanel) -> [Quantity; 4] {
+    let time = Quantity::new("time t", "s");
     [
-        column(format!("position q{joint}"), kind.position_unit()),
-        column(format!("velocity qd{joint}"), kind.velocity_unit()),
-        column(
-            format!("{} tau{joint}", kind.force_name()),
-            kind.force_unit(),
-        ),
-        column("time t".to_owned(), "s"),
+        kind.position(joint),
+        kind.velocity(joint),
+        kind.force(joint),
+        time,
     ]
 }
 
 fn draw_row(canvas: &mut Canvas, panel: &ShapePanel, top: f64) {
     let residual = format!("residual {}", panel.kind.force_name());
-    let range = force_range(panel);
-    let y = Axis::vertical(range, PANEL_HEIGHT, &residual, panel.kind.force_unit());
+    let residual = Quantity::new(residual, panel.kind.force_unit());
+    let y = Axis::vertical(force_range(panel), PANEL_HEIGHT, &residual);
     let left = MARGIN + y.gutter();
     let width = (WIDTH - MARGIN - left - 3.0 * PANEL_GAP) / 4.0;
     let mut area = Area {
@@ -130,13 +121,11 @@ fn draw_row(canvas: &mut Canvas, panel: &ShapePanel, top: f64) {
             curve: model.curves[k].as_ref(),
         });
         let shown: Vec<Shown> = shown.collect();
-        let range = state_range(&shown);
-        let x = Axis::horizontal(range, width, &column.quantity, column.unit);
+        let x = Axis::horizontal(state_range(&shown), width, &column);
         let frame = Frame { area, x: &x, y: &y };
         draw_panel(canvas, &frame, &shown);
         if area.x == left {
-            canvas.add(frame.y_numbers());
-            canvas.add(frame.y_label());
+            canvas.add(frame.y_labels());
         }
         area.x += width + PANEL_GAP;
     }
@@ -184,13 +173,9 @@ fn draw_panel(canvas: &mut Canvas, frame: &Frame, shown: &[Shown<'_>]) {
         }
     }
     canvas.add(inner);
-    let points = || shown.iter().flat_map(|shown| &shown.cloud);
-    let total = points().count();
-    let outside = points().filter(|point| !frame.holds(**point)).count();
-    if total == 0 {
-        canvas.add(no_data(frame.area));
-    } else if outside > 0 {
-        canvas.add(remark(frame.area, &format!("{outside} of {total} outside")));
+    let points = shown.iter().flat_map(|shown| &shown.cloud).copied();
+    if let Some(remark) = frame.hidden(points, "outside") {
+        canvas.add(remark);
     }
 }
 
@@ -214,7 +199,7 @@ fn with_curve(inner: SVG, frame: &Frame, role: Role, curve: &ShapeCurve) -> SVG 
 #[cfg(test)]
 mod tests {
     use super::{ShapeCurve, ShapeModel, ShapePanel, ShapeSample, residual_shape};
-    use crate::{JointKind, PlotError, Role};
+    use crate::{JointKind, Role};
     use residyn_core::data::Joint;
 
     fn panel(samples: Vec<ShapeSample>) -> ShapePanel {
@@ -276,17 +261,6 @@ mod tests {
         assert!(
             figure.len() > without.len() && figure.contains("Z\""),
             "{figure}"
-        );
-    }
-
-    #[test]
-    fn no_panel_is_an_error() {
-        let error = residual_shape(&[], "none").unwrap_err();
-        assert_eq!(
-            error,
-            PlotError::Empty {
-                title: "none".to_owned()
-            }
         );
     }
 }

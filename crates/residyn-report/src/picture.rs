@@ -40,8 +40,7 @@ fn motion(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
     }
     let panel = |joint: Joint| Panel {
         label: label(outcome, joint),
-        quantity: format!("position q{joint}"),
-        unit: kind(outcome, joint).position_unit(),
+        quantity: kind(outcome, joint).position(joint),
         tracks: std::iter::once(measured(log, joint))
             .chain(models.iter().map(|(role, label, traces)| Track {
                 label: (*label).to_owned(),
@@ -74,7 +73,6 @@ fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
             segments: vec![beginning(log, &of.time, &values[joint])],
         };
     let panel = |joint: Joint| {
-        let kind = kind(outcome, joint);
         let logged = needed.first();
         let logged =
             logged.map(|(_, _, of)| curve("measured", Role::Measured, of, &of.logged, joint));
@@ -82,8 +80,7 @@ fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
         let models = models.map(|(role, label, of)| curve(label, *role, of, &of.needed, joint));
         Panel {
             label: label(outcome, joint),
-            quantity: format!("{} tau{joint}", kind.force_name()),
-            unit: kind.force_unit(),
+            quantity: kind(outcome, joint).force(joint),
             tracks: logged.into_iter().chain(models).collect(),
         }
     };
@@ -93,7 +90,7 @@ fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
     residyn_plot::predictions(&panels, &title)
 }
 
-fn kind(outcome: &Outcome, joint: Joint) -> JointKind {
+pub(super) fn kind(outcome: &Outcome, joint: Joint) -> JointKind {
     JointKind::of(outcome.given.prismatic[joint])
 }
 
