@@ -87,7 +87,7 @@ pub(super) fn ranges(outcome: &Outcome, by_log: &[OfLogEntry]) -> Vec<RangeEntry
     shared.filter_map(range).collect()
 }
 
-fn half_width([low, high]: [f64; 2]) -> f64 {
+pub(super) fn half_width([low, high]: [f64; 2]) -> f64 {
     0.5 * (high - low)
 }
 

@@ -181,6 +181,5 @@ const TIMINGS: &str = "timings.json";
 /// How long each stage took.
 fn timings(outcome: &Outcome) -> String {
     let entry = |(stage, seconds): &(Stage, f64)| serde_json::json!({ "stage": stage, "about": stage.text(), "seconds": seconds });
-    let all: Vec<_> = outcome.seconds.iter().map(entry).collect();
-    serde_json::to_string_pretty(&all).expect("times are finite") + "\n"
+    json(&outcome.seconds.iter().map(entry).collect::<Vec<_>>())
 }

@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 use super::effect_curve::{EffectCurveEntry, effect_curves};
 use super::headline::label;
 use super::motion::MotionEntry;
+use super::picture::kind;
 use residyn_core::closeloop::{ErrorModel, ForceSample, Outcome, ResidualForce};
+use residyn_core::data::statistics::mean;
 use residyn_core::data::{Joint, Log};
 use residyn_core::sim::metric::Trace;
 
@@ -113,16 +115,17 @@ pub(super) fn motion<'a>(
     models: impl IntoIterator<Item = &'a [Trace]>,
 ) -> Series<'a> {
     let of_models: Vec<&[Trace]> = models.into_iter().collect();
-    let windows = || of_models[0].iter().enumerate();
-    let time: Vec<f64> = windows()
-        .flat_map(|(_, trace)| trace.time.clone())
+    let times: Vec<&[f64]> = of_models[0]
+        .iter()
+        .map(|trace| trace.time.as_slice())
         .collect();
+    let time = times.concat();
     let row = |t: &f64| log.time.partition_point(|logged| logged < t);
     let joints = || Joint::all(log.q.len());
     Series {
         log,
-        window: windows()
-            .flat_map(|(k, trace)| vec![k; trace.time.len()])
+        window: (times.iter().enumerate())
+            .flat_map(|(k, time)| vec![k; time.len()])
             .collect(),
         measured: joints()
             .map(|joint| time.iter().map(|t| log.q[joint][row(t)]).collect())
@@ -226,30 +229,26 @@ fn error(one: &Series<'_>, rows: &Rows) -> f64 {
     (all / count).sqrt()
 }
 
-#[allow(clippy::cast_precision_loss)] // rows are far fewer than 2^52
 pub(super) fn variance(values: &[f64]) -> f64 {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count
+    let middle = mean(values);
+    let squares: Vec<f64> = values.iter().map(|v| (v - middle).powi(2)).collect();
+    mean(&squares)
 }
 
 fn segment(outcome: &Outcome, one: &Series<'_>, rows: Rows, about: String) -> SegmentEntry {
     let kept: Vec<usize> = rows.clone().step_by(rows.len() / POINTS + 1).collect();
     // A curve is broken where it restarts.
-    let breaks = |place: usize| place > 0 && one.window[kept[place]] != one.window[kept[place - 1]];
-    let breaks: Vec<bool> = (0..kept.len())
-        .map(|place| outcome.error_model == ErrorModel::OutputError && breaks(place))
-        .collect();
+    let restarts = outcome.error_model == ErrorModel::OutputError;
+    let breaks = |k: usize| restarts && k > 0 && one.window[kept[k]] != one.window[kept[k - 1]];
     let values = |of: &[f64]| -> Vec<Option<f64>> {
         let kept = kept.iter().map(|row| of[*row]);
         kept.map(|v| v.is_finite().then(|| rounded(v))).collect()
     };
     let predicted = |model: usize, joint: Joint| -> Vec<Option<f64>> {
         let of_model = one.models.get(model).map(|model| values(&model[joint]));
-        let broken = of_model.unwrap_or_default().into_iter().zip(&breaks);
-        broken
-            .map(|(value, breaks)| value.filter(|_| !breaks))
-            .collect()
+        let values = of_model.unwrap_or_default().into_iter().enumerate();
+        let broken = values.map(|(k, value)| value.filter(|_| !breaks(k)));
+        broken.collect()
     };
     let of_joint = |joint: Joint| SeriesEntry {
         quantity: quantity(outcome, joint),
@@ -268,11 +267,10 @@ fn segment(outcome: &Outcome, one: &Series<'_>, rows: Rows, about: String) -> Se
 
 /// `position of joint 2 (elbow), rad`
 fn quantity(outcome: &Outcome, joint: Joint) -> String {
-    let (what, unit) = match (outcome.error_model, outcome.given.prismatic[joint]) {
-        (ErrorModel::OutputError, false) => ("position", "rad"),
-        (ErrorModel::OutputError, true) => ("position", "m"),
-        (ErrorModel::InverseDynamics, false) => ("torque", "N m"),
-        (ErrorModel::InverseDynamics, true) => ("force", "N"),
+    let kind = kind(outcome, joint);
+    let (what, unit) = match outcome.error_model {
+        ErrorModel::OutputError => ("position", kind.position_unit()),
+        ErrorModel::InverseDynamics => (kind.force_name(), kind.force_unit()),
     };
     format!("{what} of joint {}, {unit}", label(outcome, joint))
 }
@@ -289,9 +287,13 @@ fn scatters(outcome: &Outcome) -> Vec<ScatterEntry> {
         let kept = of.samples.iter().step_by(step);
         kept.map(|sample| rounded(value(sample))).collect()
     };
-    let units = |joint: Joint| match outcome.given.prismatic[joint] {
-        false => ["rad", "rad/s", "N m"],
-        true => ["m", "m/s", "N"],
+    let units = |joint: Joint| {
+        let kind = kind(outcome, joint);
+        [
+            kind.position_unit(),
+            kind.velocity_unit(),
+            kind.force_unit(),
+        ]
     };
     let of_joint = |joint: Joint| ScatterEntry {
         joint,
@@ -319,8 +321,12 @@ fn range(force: &ResidualForce, joint: Joint, variable: &str) -> [f64; 2] {
         "tau" => sample.tau[joint],
         _ => sample.time_s,
     };
-    let all = force.samples.iter().map(value);
-    all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+    span(force.samples.iter().map(value))
+}
+
+/// The least and the largest value.
+pub(super) fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
         [low.min(x), high.max(x)]
     })
 }

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::sketch::{PictureEntry, Point, Sketch};
 use super::{Frames, Tracks};
 use crate::headline::label;
+use crate::plot_data::span;
 use residyn_core::closeloop::Outcome;
 use residyn_core::data::Joint;
 
@@ -43,9 +44,7 @@ fn dial(about: String, joint: Joint) -> Sketch<impl Fn(&[f64]) -> Vec<Point>> {
 }
 
 fn rail(about: String, joint: Joint, measured: &Frames) -> Sketch<impl Fn(&[f64]) -> Vec<Point>> {
-    let along = measured.iter().map(|q| q[joint]);
-    let low = along.clone().fold(f64::INFINITY, f64::min);
-    let high = along.fold(f64::NEG_INFINITY, f64::max);
+    let [low, high] = span(measured.iter().map(|q| q[joint]));
     let length = (high - low).max(f64::MIN_POSITIVE);
     let height = HEIGHT * length;
     Sketch {

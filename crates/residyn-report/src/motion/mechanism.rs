@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Tracks;
 use super::sketch::{PictureEntry, Point, Sketch};
+use crate::plot_data::span;
 use residyn_core::closeloop::Outcome;
 use residyn_core::decomposition::eigen;
 use residyn_core::model::chain::{Joint, Pose, recover};
@@ -24,16 +25,13 @@ pub(super) fn drawn(
     let seen: Vec<Vec<Vector3<f64>>> = tracks[0].iter().map(|q| points(&links, q)).collect();
     let [right, up] = view(&seen);
     let flat = |point: &Vector3<f64>| [point.dot(&right), point.dot(&up)];
-    let all = || seen.iter().flatten().map(flat);
-    let least = all().fold([f64::INFINITY; 2], |a, b| [a[0].min(b[0]), a[1].min(b[1])]);
-    let most = all().fold([f64::NEG_INFINITY; 2], |a, b| {
-        [a[0].max(b[0]), a[1].max(b[1])]
-    });
-    let half = BASE * (most[0] - least[0]).max(most[1] - least[1]);
+    let spans = [0, 1].map(|k| span(seen.iter().flatten().map(|point| flat(point)[k])));
+    let [[leftmost, rightmost], [lowest, highest]] = spans;
+    let half = BASE * (rightmost - leftmost).max(highest - lowest);
     let sketch = Sketch {
         about: "the mechanism".to_owned(),
-        low: [least[0].min(-half), least[1].min(0.0)],
-        high: [most[0].max(half), most[1].max(0.0)],
+        low: [leftmost.min(-half), lowest.min(0.0)],
+        high: [rightmost.max(half), highest.max(0.0)],
         ground: vec![[-half, 0.0], [half, 0.0]],
         line: |q: &[f64]| -> Vec<Point> { points(&links, q).iter().map(flat).collect() },
     };

@@ -2,7 +2,8 @@
 
 use maud::{Markup, html};
 
-use crate::by_log::OfLogEntry;
+use super::table;
+use crate::by_log::{OfLogEntry, half_width};
 use crate::schema::{ParameterEntry, Report};
 use crate::wording::{amount, small};
 use residyn_core::closeloop::ErrorModel;
@@ -23,9 +24,7 @@ pub(super) fn by_log(report: &Report) -> Markup {
 
 /// By how much a value of one log is off, in half widths of its interval: 0 within it, 1 to 3 beyond.
 fn mark(of_log: &ParameterEntry, of_all: f64) -> &'static str {
-    let half = of_log
-        .ci95
-        .map_or(f64::INFINITY, |[low, high]| 0.5 * (high - low));
+    let half = of_log.ci95.map_or(f64::INFINITY, half_width);
     match (of_log.value - of_all).abs() / half {
         far if far > 3.0 => "off-3",
         far if far > 2.0 => "off-2",
@@ -34,20 +33,22 @@ fn mark(of_log: &ParameterEntry, of_all: f64) -> &'static str {
     }
 }
 
+fn names(report: &Report) -> impl Iterator<Item = &str> {
+    report.by_log.iter().map(|log| log.log.as_str())
+}
+
 fn values(report: &Report) -> Markup {
-    html! {
-        div.table tabindex="0" { table {
-            thead { tr { th { "parameter" } th { "all logs" } @for log in &report.by_log { th { (log.log) } } } }
-            tbody {
-                @for of_all in &report.ranges {
-                    tr {
-                        th scope="row" { code { (of_all.name) } @if of_all.unit != "1" { ", " (of_all.unit) } }
-                        td { (digits_of(of_all.value, Some(of_all.range)).0) }
-                        @for log in &report.by_log { (value(log, &of_all.name, of_all.value)) }
-                    }
-                }
+    let rows = html! {
+        @for of_all in &report.ranges {
+            tr {
+                th scope="row" { code { (of_all.name) } @if of_all.unit != "1" { ", " (of_all.unit) } }
+                td { (digits_of(of_all.value, Some(of_all.range)).0) }
+                @for log in &report.by_log { (value(log, &of_all.name, of_all.value)) }
             }
-        } }
+        }
+    };
+    html! {
+        (table(["parameter", "all logs"].into_iter().chain(names(report)), &rows))
         @for log in &report.by_log {
             @if let Some(failure) = &log.failure { p { (log.log) ": " (failure) "." } }
         }
@@ -83,20 +84,18 @@ fn crossed(report: &Report) -> Markup {
         ErrorModel::InverseDynamics => "relative torque error",
     };
     let error = |error: &Option<f64>| error.map_or_else(|| "-".to_owned(), small);
+    let rows = html! {
+        @for (k, log) in report.by_log.iter().enumerate() {
+            tr {
+                th scope="row" { (log.log) }
+                @for (other, of_log) in log.errors.iter().enumerate() { td.own[other == k] { (error(of_log)) } }
+            }
+        }
+    };
     html! {
         @if report.by_log.iter().any(|log| !log.errors.is_empty()) {
             p { "Fitted to the log of the row, scored on the log of the column: " (what) "." }
-            div.table tabindex="0" { table {
-                thead { tr { th { "fitted to" } @for log in &report.by_log { th { (log.log) } } } }
-                tbody {
-                    @for (k, log) in report.by_log.iter().enumerate() {
-                        tr {
-                            th scope="row" { (log.log) }
-                            @for (other, of_log) in log.errors.iter().enumerate() { td.own[other == k] { (error(of_log)) } }
-                        }
-                    }
-                }
-            } }
+            (table(["fitted to"].into_iter().chain(names(report)), &rows))
         }
     }
 }

@@ -3,24 +3,23 @@
 use maud::{Markup, html};
 use serde::Serialize;
 
-use super::Section;
 use super::results::ResultsPage;
+use super::{Section, table};
 use crate::schema::{LogEntry, Report};
 use crate::wording::split;
 use residyn_core::model::Call;
 
 pub(super) fn section(report: &Report) -> Section {
+    let heads = ["log", "role", "rows", "from, s", "to, s", "left out, s"];
+    let rows = html! {
+        @for log in &report.logs.train { (row(log, "fitted")) }
+        @for log in &report.logs.test { (row(log, "test")) }
+    };
     of(html! {
         (program(&report.version, Some(report.seed)))
         @if let Some(call) = &report.call { (called(call)) }
         p { "Test logs: " (split(&report.logs.split)) "." }
-        div.table tabindex="0" { table {
-            thead { tr { th { "log" } th { "role" } th { "rows" } th { "from, s" } th { "to, s" } th { "left out, s" } } }
-            tbody {
-                @for log in &report.logs.train { (row(log, "fitted")) }
-                @for log in &report.logs.test { (row(log, "test")) }
-            }
-        } }
+        (table(heads, &rows))
         (folded("Configuration as resolved", &report.configuration))
         (folded("Every tuning constant", &report.settings))
     })
@@ -54,29 +53,25 @@ fn program(version: &str, seed: Option<u64>) -> Markup {
 }
 
 fn folded(what: &str, value: &impl Serialize) -> Markup {
-    html! { details { summary { (what) } pre tabindex="0" { (pretty(value)) } } }
+    let text =
+        serde_json::to_string_pretty(value).expect("a report has only finite numbers and texts");
+    html! { details { summary { (what) } pre tabindex="0" { (text) } } }
 }
 
 /// The command, when it ran, and its files with their hashes.
 fn called(call: &Call) -> Markup {
+    let files = html! {
+        @for file in &call.inputs {
+            tr { td { (file.role) } th scope="row" { (file.path) } td { code { (file.sha256) } } }
+        }
+    };
     html! {
         p { "Started on " (call.began) ", took " (format!("{:.1}", call.took_s)) " s:" }
         pre tabindex="0" { (call.command) }
         @if !call.inputs.is_empty() {
-            div.table tabindex="0" { table {
-                thead { tr { th { "read as" } th { "file" } th { "SHA-256" } } }
-                tbody {
-                    @for file in &call.inputs {
-                        tr { td { (file.role) } th scope="row" { (file.path) } td { code { (file.sha256) } } }
-                    }
-                }
-            } }
+            (table(["read as", "file", "SHA-256"], &files))
         }
     }
-}
-
-fn pretty(value: &impl Serialize) -> String {
-    serde_json::to_string_pretty(value).expect("a report has only finite numbers and texts")
 }
 
 fn row(log: &LogEntry, role: &str) -> Markup {

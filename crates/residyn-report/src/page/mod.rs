@@ -93,6 +93,16 @@ fn head(report: &Report) -> Markup {
     }
 }
 
+/// A table that scrolls by itself if it is wide.
+fn table<'h>(heads: impl IntoIterator<Item = &'h str>, rows: &Markup) -> Markup {
+    html! {
+        div.table tabindex="0" { table {
+            thead { tr { @for head in heads { th { (head) } } } }
+            tbody { (rows) }
+        } }
+    }
+}
+
 /// The report itself, for the pictures and for other programs. No text in it can end the element.
 fn data(report: &Report) -> Markup {
     let json = serde_json::to_string(report).expect("a report has only finite numbers and texts");

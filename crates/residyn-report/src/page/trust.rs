@@ -2,10 +2,10 @@
 
 use maud::{Markup, html};
 
-use super::Section;
 use super::calibration::calibration;
 use super::logs::by_log;
 use super::missing::value;
+use super::{Section, table};
 use crate::bodies::{poor, sum};
 use crate::diagnostics::{network, structure};
 use crate::schema::{FitEntry, Report};
@@ -55,25 +55,30 @@ fn alternatives(report: &Report) -> Markup {
 
 fn parameters(report: &Report) -> Markup {
     let known = &report.identifiability;
+    let heads = [
+        "parameter",
+        "declared",
+        "fitted without the effects",
+        "final",
+        "identifiable",
+    ];
+    let rows = html! {
+        @for one in &report.parameters {
+            tr.doubtful[!one.fitted.identifiable] {
+                th scope="row" { code { (one.fitted.name) } }
+                td { (small(one.declared)) }
+                td { (small(one.before)) }
+                td { (amount(&one.fitted)) }
+                td { @if one.fitted.identifiable { "yes" } @else { "no" } }
+            }
+        }
+    };
     html! {
         h3 { "Parameters" }
         p { "The logs determine " (known.determined) " of " (known.free) " free parameters of the declared equations." }
         details open[report.parameters.len() <= MOST_SHOWN] {
             summary { "Values with their 95 % intervals" }
-            div.table tabindex="0" { table {
-                thead { tr { th { "parameter" } th { "declared" } th { "fitted without the effects" } th { "final" } th { "identifiable" } } }
-                tbody {
-                    @for one in &report.parameters {
-                        tr.doubtful[!one.fitted.identifiable] {
-                            th scope="row" { code { (one.fitted.name) } }
-                            td { (small(one.declared)) }
-                            td { (small(one.before)) }
-                            td { (amount(&one.fitted)) }
-                            td { @if one.fitted.identifiable { "yes" } @else { "no" } }
-                        }
-                    }
-                }
-            } }
+            (table(heads, &rows))
         }
         (bodies(report))
     }
@@ -82,24 +87,22 @@ fn parameters(report: &Report) -> Markup {
 /// The sums of the bodies' parameters that torques determine.
 fn bodies(report: &Report) -> Markup {
     let known = &report.identifiability;
+    let rows = html! {
+        @for one in &known.bodies {
+            tr {
+                th scope="row" { (one.body) }
+                td { code { (sum(one)) } }
+                td { (small(one.declared)) }
+                td { (amount_of(one.value, Some(one.ci95), &one.unit)) }
+            }
+        }
+    };
     html! {
         @if known.identifiable_at_most > 0 {
             details {
                 summary { "Bodies: these logs determine " (known.bodies.len()) " of the " (known.identifiable_at_most) " sums of parameters that any motion could determine" }
                 p { (poor(known.bodies.len(), known.identifiable_at_most)) }
-                div.table tabindex="0" { table {
-                    thead { tr { th { "body" } th { "sum" } th { "declared" } th { "fitted" } } }
-                    tbody {
-                        @for one in &known.bodies {
-                            tr {
-                                th scope="row" { (one.body) }
-                                td { code { (sum(one)) } }
-                                td { (small(one.declared)) }
-                                td { (amount_of(one.value, Some(one.ci95), &one.unit)) }
-                            }
-                        }
-                    }
-                } }
+                (table(["body", "sum", "declared", "fitted"], &rows))
             }
         }
     }
@@ -129,10 +132,11 @@ fn fits(report: &Report) -> Markup {
 }
 
 fn findings(report: &Report) -> Markup {
+    let warnings = warnings(report);
     html! {
         h3 { "The logs" }
-        @if message(report).is_empty() { p { "The audit found nothing to warn about." } }
-        @for (log, findings) in message(report) {
+        @if warnings.is_empty() { p { "The audit found nothing to warn about." } }
+        @for (log, findings) in warnings {
             details {
                 summary { (log) ": " (findings.len()) @if findings.len() == 1 { " finding" } @else { " findings" } }
                 ul { @for finding in findings { li { (finding.to_string()) } } }
@@ -142,7 +146,7 @@ fn findings(report: &Report) -> Markup {
 }
 
 /// What the audit found in each log, except for remarks; logs without findings are left out.
-fn message(report: &Report) -> Vec<(&str, Vec<&Finding>)> {
+fn warnings(report: &Report) -> Vec<(&str, Vec<&Finding>)> {
     let matters = |finding: &&Finding| finding.severity != Severity::Info;
     let of_log = report.audit.iter().map(|audit| {
         let findings = audit.findings.iter().filter(matters).collect();
