@@ -158,7 +158,7 @@ fn published(
         headline: results.headline(),
         text: results.text(),
         shares: Vec::new(),
-        figure: Some(picture(&results)?),
+        figure: Some(picture(&results)),
         json: serde_json::to_string_pretty(&results)? + "\n",
         config: results.config,
         answer: Answer::Yes,

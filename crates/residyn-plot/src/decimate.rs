@@ -4,7 +4,7 @@
 ///
 /// The points are cut into runs of equal number; each run keeps its lowest and its highest point, in their order.
 /// The first and the last point always stay. `limit` below four keeps just these two.
-pub fn decimate(points: &[(f64, f64)], limit: usize) -> Vec<(f64, f64)> {
+pub(crate) fn decimate(points: &[(f64, f64)], limit: usize) -> Vec<(f64, f64)> {
     let [first, inner @ .., last] = points else {
         return points.to_vec();
     };

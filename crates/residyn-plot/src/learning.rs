@@ -2,16 +2,13 @@
 
 use svg::node::element::SVG;
 
-use super::PlotError;
 use super::axes::{Axis, FOOT, Frame, HEAD, Quantity, heading, no_data, remark};
 use super::canvas::{Area, Canvas, clipped, curves, dots, filled};
-use super::legend::{Entry, Sample, begin};
+use super::legend::{Entry, Sample, with_key};
 use super::scale::{Range, Scale};
 use super::style::{BLACK, BLUE, GREEN, MARGIN, OTHERS, Stroke, VERMILION, WIDTH};
 
-/// More columns than this leave no room for numbers.
-const MAX_COLUMNS: usize = 3;
-const COLUMN_GAP: f64 = 20.0;
+const HEIGHT: f64 = 380.0;
 const DOT_PX: f64 = 5.5;
 /// Dots closer than about this would run into one another.
 const MAX_DOTS: usize = 40;
@@ -97,41 +94,24 @@ pub struct LearningPanel {
     pub curves: Vec<MethodCurve>,
 }
 
-/// Draws the panels side by side, three in a row at most: for each method a line through the means, in a band of
-/// one standard deviation to either side.
+/// Draws for each method a line through the means, in a band of one standard deviation to either side.
 ///
 /// Axes cover all bands. Points that are not finite leave a gap, as do points at zero and below on a logarithmic axis;
 /// a remark counts them.
-///
-/// # Errors
-/// No panel.
-pub fn learning_curves(panels: &[LearningPanel], title: &str) -> Result<String, PlotError> {
-    let (mut canvas, mut top) = begin(title, panels, entries)?;
-    let columns = columns(panels.len());
-    let width = (WIDTH - 2.0 * MARGIN + COLUMN_GAP) / columns as f64 - COLUMN_GAP;
-    let height = if columns == 1 { 380.0 } else { 280.0 };
-    for row in panels.chunks(columns) {
-        for (column, panel) in row.iter().enumerate() {
-            let area = Area {
-                x: MARGIN + column as f64 * (width + COLUMN_GAP),
-                y: top + HEAD,
-                width,
-                height,
-            };
-            draw_panel(&mut canvas, panel, area);
-        }
-        top += HEAD + height + FOOT;
-    }
-    Ok(canvas.finish(top + 6.0))
+pub fn learning_curves(panel: &LearningPanel, title: &str) -> String {
+    let (mut canvas, top) = with_key(title, entries(panel));
+    let whole = Area {
+        x: MARGIN,
+        y: top + HEAD,
+        width: WIDTH - 2.0 * MARGIN,
+        height: HEIGHT,
+    };
+    draw_panel(&mut canvas, panel, whole);
+    canvas.finish(whole.bottom() + FOOT + 6.0)
 }
 
-/// The number of columns that gives rows of about equal length.
-fn columns(panels: usize) -> usize {
-    panels.div_ceil(panels.div_ceil(MAX_COLUMNS))
-}
-
-fn entries(panels: &[LearningPanel]) -> Vec<Entry> {
-    let mut methods: Vec<&MethodCurve> = panels.iter().flat_map(|panel| &panel.curves).collect();
+fn entries(panel: &LearningPanel) -> Vec<Entry> {
+    let mut methods: Vec<&MethodCurve> = panel.curves.iter().collect();
     methods.sort_by_key(|curve| curve.method);
     let band = |curve: &MethodCurve| Entry::new(Sample::Band(curve.method.stroke()), &curve.label);
     methods.into_iter().map(band).collect()
@@ -265,7 +245,7 @@ fn add_remark(canvas: &mut Canvas, frame: &Frame, panel: &LearningPanel) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Course, LearningPanel, MethodCurve, Quantity, Spread, columns, learning_curves};
+    use super::{Course, LearningPanel, MethodCurve, Quantity, Spread, learning_curves};
     use crate::{Method, Scale};
 
     fn panel(x_scale: Scale, curves: Vec<MethodCurve>) -> LearningPanel {
@@ -303,7 +283,7 @@ mod tests {
     }
 
     fn drawn(panel: LearningPanel) -> String {
-        learning_curves(&[panel], "learning").unwrap()
+        learning_curves(&panel, "learning")
     }
 
     #[test]
@@ -365,15 +345,14 @@ mod tests {
     }
 
     #[test]
-    fn the_key_names_each_method_once() {
-        let one = panel(
+    fn the_key_names_each_method_once_in_order() {
+        let figure = drawn(panel(
             Scale::Linear,
             vec![
                 level(Method::Perfect, 2.0, 0.1),
                 learned(Method::Hybrid, &[(1.0, 1.0, 0.1)]),
             ],
-        );
-        let figure = learning_curves(&[one.clone(), one], "key").unwrap();
+        ));
         assert_eq!(figure.matches("Perfect").count(), 1);
         assert!(figure.find("Hybrid") < figure.find("Perfect"));
     }
@@ -396,10 +375,5 @@ mod tests {
                 assert!(one.colour != other.colour && one.dash != other.dash);
             }
         }
-    }
-
-    #[test]
-    fn rows_are_of_about_equal_length() {
-        assert_eq!([1, 2, 3, 4, 5, 6, 7].map(columns), [1, 2, 3, 2, 3, 3, 3]);
     }
 }

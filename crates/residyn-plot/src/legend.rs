@@ -38,7 +38,7 @@ impl Entry {
     }
 }
 
-/// Begins a figure of some panels: a canvas with a title and a key, each entry once, and where these end.
+/// Begins a figure of some panels as [`with_key`] does.
 ///
 /// # Errors
 /// No panel.
@@ -48,12 +48,17 @@ pub(crate) fn begin<P>(
     entries: impl Fn(&[P]) -> Vec<Entry>,
 ) -> Result<(Canvas, f64), PlotError> {
     if panels.is_empty() {
-        return Err(PlotError::Empty {
+        return Err(PlotError {
             title: title.to_owned(),
         });
     }
+    Ok(with_key(title, entries(panels)))
+}
+
+/// A canvas with a title and a key, each entry once, and where these end.
+pub(crate) fn with_key(title: &str, entries: Vec<Entry>) -> (Canvas, f64) {
     let mut once: Vec<Entry> = Vec::new();
-    for entry in entries(panels) {
+    for entry in entries {
         if !once.contains(&entry) {
             once.push(entry);
         }
@@ -61,7 +66,7 @@ pub(crate) fn begin<P>(
     let mut canvas = Canvas::new(title);
     let (key, end) = legend(&once, canvas.top);
     canvas.add(key);
-    Ok((canvas, end))
+    (canvas, end)
 }
 
 /// Draws the entries from `top` down, and returns where they end.

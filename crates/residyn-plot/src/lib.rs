@@ -20,7 +20,7 @@ mod scale;
 mod style;
 
 pub use axes::Quantity;
-pub use decimate::{bends, decimate};
+pub use decimate::bends;
 pub use error_bars::{Bar, ErrorRow, error_bars};
 pub use learning::{Course, LearningPanel, Method, MethodCurve, Spread, learning_curves};
 pub use predictions::{Panel, Track, predictions};
@@ -30,15 +30,12 @@ pub use style::Role;
 
 use residyn_core::data::Joint;
 
-/// A figure that cannot be drawn.
+/// A figure that was asked for without a single panel or row.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum PlotError {
-    /// The figure was asked for without a single panel or row.
-    #[error("figure {title:?} has nothing to show; give it at least one panel or row")]
-    Empty {
-        /// The title that the figure would have had.
-        title: String,
-    },
+#[error("figure {title:?} has nothing to show; give it at least one panel or row")]
+pub struct PlotError {
+    /// The title that the figure would have had.
+    pub title: String,
 }
 
 /// How a joint moves: fixes the units on the axes.

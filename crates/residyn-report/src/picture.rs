@@ -17,7 +17,7 @@ const SHOWN_S: f64 = 8.0;
 /// What was compared on the beginning of the first test log: open-loop predictions of its motion, or the torques that it needs.
 pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
     let Some(log) = outcome.given.test.first() else {
-        return Err(PlotError::Empty {
+        return Err(PlotError {
             title: "predictions".into(),
         });
     };

@@ -8,7 +8,6 @@ use residyn_core::closeloop::StudyError;
 use residyn_core::model::FileError;
 use residyn_core::plant::PlantError;
 use residyn_io::runs::RunFolderError;
-use residyn_plot::PlotError;
 use residyn_train::CheckpointError;
 use residyn_train::recipe::RecipeError;
 
@@ -40,8 +39,6 @@ pub enum ExperimentError {
     Task(#[from] TaskError),
     #[error(transparent)]
     Plant(#[from] PlantError),
-    #[error(transparent)]
-    Plot(#[from] PlotError),
 }
 
 impl ExperimentError {

@@ -1,14 +1,10 @@
 use super::{Course, PERFECT, PRIOR, Results};
 use residyn_plot::{
-    Course as Curve, LearningPanel, Method, MethodCurve, PlotError, Quantity, Scale, Spread,
-    learning_curves,
+    Course as Curve, LearningPanel, Method, MethodCurve, Quantity, Scale, Spread, learning_curves,
 };
 
 /// The figure of an experiment, as SVG text: return against real transitions or against receding horizons.
-///
-/// # Errors
-/// None for the results of an experiment.
-pub fn picture(results: &Results) -> Result<String, PlotError> {
+pub fn picture(results: &Results) -> String {
     let horizons = results.receding_horizon.as_deref();
     let mut others = 0;
     let curves = (results.methods.iter()).map(|(name, course)| MethodCurve {
@@ -32,7 +28,7 @@ pub fn picture(results: &Results) -> Result<String, PlotError> {
         results.experiment,
         results.seeds.len()
     );
-    learning_curves(&[panel], &title)
+    learning_curves(&panel, &title)
 }
 
 fn method(name: &str, others: &mut usize) -> Method {
