@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use roxmltree::{Document, Error, Node};
 
 use super::robot::element::Element;
+use residyn_core::limits::XML_DEPTH;
 use residyn_core::model::FileError;
 use residyn_io::files::read_text;
 
@@ -35,11 +36,19 @@ impl<'x> Source<'x> {
             let message = format!("this is not valid XML: {error}");
             FileError::new(path, Some(place(&error, text)), message)
         })?;
-        Ok(Self {
+        let source = Self {
             path: path.to_owned(),
             document,
             notes: RefCell::default(),
-        })
+        };
+        match too_deep(source.document_root(), XML_DEPTH) {
+            None => Ok(source),
+            Some(node) => {
+                let message =
+                    format!("is nested in more than {XML_DEPTH} elements; flatten the file");
+                Err(source.error(node, message))
+            }
+        }
     }
 
     /// Note something about an element that is not an error.
@@ -125,6 +134,14 @@ impl<'x> Source<'x> {
         let attribute = node.attribute_node(key);
         let at = attribute.map_or(node.range().start, |a| a.range_value().start);
         self.error_at(at, message)
+    }
+}
+
+/// The first element that is more than `most` levels deep, the given one being the first level.
+fn too_deep<'a, 'x>(node: Node<'a, 'x>, most: usize) -> Option<Node<'a, 'x>> {
+    match most.checked_sub(1) {
+        None => Some(node),
+        Some(most) => elements(node).find_map(|child| too_deep(child, most)),
     }
 }
 

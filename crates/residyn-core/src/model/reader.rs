@@ -39,6 +39,14 @@ impl FileError {
         }
     }
 
+    /// An error at a place in the text of a file \[bytes\].
+    pub fn at(path: &Path, text: &str, at: usize, message: impl Into<String>) -> Self {
+        let before = &text[..text.floor_char_boundary(at)];
+        let line = before.matches('\n').count() + 1;
+        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+        Self::new(path, Some((line, column)), message)
+    }
+
     /// The same error, with this as a further remedy.
     #[must_use]
     pub fn remedied_by(self, remedy: FileRemedy) -> Self {
@@ -106,10 +114,7 @@ impl Document {
     }
 
     pub fn error(&self, at: usize, message: impl Into<String>) -> FileError {
-        let before = &self.text[..self.text.floor_char_boundary(at)];
-        let line = before.matches('\n').count() + 1;
-        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
-        FileError::new(&self.path, Some((line, column)), message)
+        FileError::at(&self.path, &self.text, at, message)
     }
 
     pub fn formula_error(&self, at: usize, error: &FormulaError) -> FileError {
