@@ -14,10 +14,7 @@ mod npz;
 mod parquet;
 #[cfg_attr(not(feature = "recordings"), path = "no_recording.rs")]
 mod recording;
-
 mod source;
-#[cfg(feature = "parquet")]
-mod thrift;
 
 use std::path::Path;
 

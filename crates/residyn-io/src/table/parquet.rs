@@ -148,7 +148,7 @@ pub(super) fn lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec
 fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>, ParquetError> {
     let file = files::open(path)?;
     let most = unpacked_bytes(file.metadata()?.len());
-    let reader = SerializedFileReader::new(Ending::of(file)?)?;
+    let reader = SerializedFileReader::new(Ending(file))?;
     check_size(&reader, most)?;
     let schema = reader.metadata().file_metadata().schema().clone();
     let fields = schema.get_fields().iter();
