@@ -1,78 +1,58 @@
 //! Files and folders that are still incomplete. Their names follow from the final names alone, so that the next writer
-//! after a kill finds and removes what is left.
+//! after a kill finds and replaces what is left.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use tempfile::TempPath;
+use tempfile::{NamedTempFile, TempPath};
 
-/// A file that replaces another once it is complete. Until then it is called `.NAME.tmp` and locked, so that two
-/// processes write it one after the other; if it is never completed, it is removed.
-pub(super) struct Fresh {
-    pub file: File,
-    path: TempPath,
+/// An empty file that is to replace `target` once it is [`complete`]. Until then it is called `.NAME.tmp` and locked, so
+/// that two processes write it one after the other; if it is never completed, it is removed.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub(super) fn fresh_file(target: &Path) -> io::Result<NamedTempFile> {
+    let fresh = locked(hidden_beside(target, ".tmp"), File::lock)?;
+    let file = fresh.as_file();
+    if file.metadata()?.len() > 0 {
+        // A killed process left it.
+        file.set_len(0)?;
+    }
+    Ok(fresh)
 }
 
-impl Fresh {
-    /// An empty file next to `target`.
-    ///
-    /// # Errors
-    /// A folder that cannot be written.
-    pub fn beside(target: &Path) -> io::Result<Self> {
-        let path = hidden_beside(target, ".tmp");
-        loop {
-            // Created anew: a link of this name is not followed.
-            let made = OpenOptions::new().write(true).create_new(true).open(&path);
-            let file = match made {
-                Ok(file) => file,
-                Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                    remove_left(&path)?;
-                    continue;
-                }
-                Err(error) => return Err(error),
-            };
-            if let Err(error) = file.lock() {
-                let _ = fs::remove_file(&path);
-                return Err(error);
-            }
-            // Between creating and locking it, another process may have taken it for a leftover.
-            if is_at(&file, &path)? {
-                let path = TempPath::try_from_path(path)?;
-                return Ok(Self { file, path });
-            }
-        }
-    }
-
-    /// Rename it to the file that it is to be.
-    ///
-    /// # Errors
-    /// A file system error; the file is then removed.
-    pub fn become_file(self, target: &Path) -> io::Result<()> {
-        self.file.sync_all()?;
-        fs::rename(&self.path, target)?;
-        let _renamed = self.path.keep();
-        Ok(())
-    }
+/// Rename a file to the one that it is to be.
+///
+/// # Errors
+/// A file system error; the file is then removed.
+pub(super) fn complete(fresh: NamedTempFile, target: &Path) -> io::Result<()> {
+    fresh.as_file().sync_all()?;
+    fs::rename(fresh.path(), target)?;
+    let _renamed = fresh.keep();
+    Ok(())
 }
 
-/// Remove a file that a killed process left. If it is being written, wait for that.
-fn remove_left(path: &Path) -> io::Result<()> {
-    match File::open(path) {
-        Ok(left) => {
-            left.lock()?;
-            match is_at(&left, path)? {
-                true => fs::remove_file(path),
-                false => Ok(()),
-            }
+/// The file at `path`, made if it is missing, once `lock` has locked it. It is removed when it is dropped.
+///
+/// # Errors
+/// A file that cannot be made, and what `lock` returns.
+pub fn locked(path: PathBuf, lock: impl Fn(&File) -> io::Result<()>) -> io::Result<NamedTempFile> {
+    loop {
+        if path.is_symlink() {
+            // It is not followed: what it leads to is not ours.
+            fs::remove_file(&path)?;
         }
-        // A link that leads nowhere, or a file that has just been renamed.
-        Err(error) if error.kind() == ErrorKind::NotFound => match path.is_symlink() {
-            true => fs::remove_file(path),
-            false => Ok(()),
-        },
-        Err(error) => Err(error),
+        let mut options = OpenOptions::new();
+        let options = options.write(true).create(true).truncate(false);
+        let file = options.open(&path)?;
+        lock(&file)?;
+        // Its last owner may have renamed or removed it between the opening and the locking.
+        if is_at(&file, &path)? {
+            let path = TempPath::try_from_path(path)?;
+            return Ok(NamedTempFile::from_parts(file, path));
+        }
     }
 }
 
@@ -125,11 +105,8 @@ pub fn hidden_beside(path: &Path, ending: &str) -> PathBuf {
 }
 
 /// Whether `path` is still the name of `file`.
-///
-/// # Errors
-/// What the system reports.
 #[cfg(unix)]
-pub fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
     let identity = |found: fs::Metadata| (found.dev(), found.ino());
     match fs::metadata(path) {
@@ -141,7 +118,7 @@ pub fn is_at(file: &File, path: &Path) -> io::Result<bool> {
 
 /// On other systems an open file keeps its name.
 #[cfg(not(unix))]
-pub fn is_at(_: &File, _: &Path) -> io::Result<bool> {
+fn is_at(_: &File, _: &Path) -> io::Result<bool> {
     Ok(true)
 }
 
@@ -150,7 +127,7 @@ mod tests {
     use std::fs;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    use super::{Fresh, FreshFolder};
+    use super::{FreshFolder, complete, fresh_file};
     use crate::files::write_whole;
 
     #[test]
@@ -186,10 +163,10 @@ mod tests {
         let writers = AtomicUsize::new(0);
         let work = || {
             for _ in 0..200 {
-                let fresh = Fresh::beside(&target).unwrap();
+                let fresh = fresh_file(&target).unwrap();
                 assert_eq!(writers.fetch_add(1, Ordering::SeqCst), 0);
                 writers.fetch_sub(1, Ordering::SeqCst);
-                fresh.become_file(&target).unwrap();
+                complete(fresh, &target).unwrap();
             }
         };
         std::thread::scope(|scope| {

@@ -6,7 +6,7 @@ mod input;
 mod named;
 mod output;
 
-pub use fresh::{FreshFolder, hidden_beside, is_at, remove_folder};
+pub use fresh::{FreshFolder, hidden_beside, locked, remove_folder};
 pub use hash::{content_hash, content_id, sha256, sha256_of};
 pub use input::{open, read_saved, read_text, size};
 pub use named::{beside, beside_or_named, text_or_embedded};

@@ -2,7 +2,7 @@ use std::fs;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use super::fresh::{Fresh, hidden_beside, remove_folder};
+use super::fresh::{complete, fresh_file, hidden_beside, remove_folder};
 use super::input::kind;
 
 /// As many links as Linux follows.
@@ -35,8 +35,8 @@ pub fn check_room(path: &Path) -> Result<(), OutputError> {
     let folder = path.ancestors().find(|folder| folder.is_dir());
     let folder = folder.unwrap_or(Path::new("."));
     let room = || {
-        let mut probe = Fresh::beside(&folder.join("room"))?;
-        probe.file.write_all(&vec![0; ROOM])
+        let probe = fresh_file(&folder.join("room"))?;
+        probe.as_file().write_all(&vec![0; ROOM])
     };
     room().map_err(OutputError::of(path))
 }
@@ -66,12 +66,12 @@ pub fn write_with(
             let missing = "its folder does not exist";
             return Err(io::Error::new(ErrorKind::NotFound, missing));
         }
-        let fresh = Fresh::beside(&target)?;
-        let mut buffer = BufWriter::new(&fresh.file);
+        let fresh = fresh_file(&target)?;
+        let mut buffer = BufWriter::new(fresh.as_file());
         write(&mut buffer)?;
         buffer.flush()?;
         drop(buffer);
-        fresh.become_file(&target)
+        complete(fresh, &target)
     };
     written().map_err(OutputError::of(path))
 }

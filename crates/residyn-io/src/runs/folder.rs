@@ -1,14 +1,15 @@
-use std::fs::{self, TryLockError};
+use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use tempfile::NamedTempFile;
 use thiserror::Error;
 
 use super::Identity;
-use super::lock::{Lock, owner};
+use super::lock;
 use crate::files::{OutputError, check_room, end_of_links, folder_of, hidden_beside, write_whole};
 
 /// What a folder belongs to: the identity of its run and the version that began it.
@@ -21,7 +22,7 @@ const RECORD: &str = "run.json";
 #[derive(Debug, Clone)]
 pub struct RunFolder {
     path: PathBuf,
-    lock: Arc<Lock>,
+    lock: Arc<NamedTempFile>,
 }
 
 /// Why a run cannot have its folder.
@@ -72,17 +73,17 @@ impl RunFolder {
         }
         let parent = folder_of(path);
         fs::create_dir_all(parent).map_err(failed("made", parent))?;
-        let lock = lock_of(path).map_err(failed("found", path))?;
-        match Lock::take(&lock) {
+        let file = lock_of(path).map_err(failed("found", path))?;
+        match lock::take(&file) {
             Ok(lock) => Ok(Self {
                 path: owned(),
                 lock: Arc::new(lock),
             }),
-            Err(TryLockError::WouldBlock) => Err(RunFolderError::Busy {
+            Err(error) if error.kind() == ErrorKind::WouldBlock => Err(RunFolderError::Busy {
                 path: owned(),
-                process: owner(&lock),
+                process: lock::owner(&file),
             }),
-            Err(TryLockError::Error(source)) => Err(failed("locked", path)(source)),
+            Err(source) => Err(failed("locked", path)(source)),
         }
     }
 
@@ -102,7 +103,8 @@ impl RunFolder {
 
     /// Remove the lock, for a process that ends at once and drops nothing.
     pub fn leave(&self) {
-        self.lock.remove();
+        // A file that stays is not locked once its owner has ended, and the next one takes it.
+        let _ = fs::remove_file(self.lock.path());
     }
 
     /// Make the folder if it is missing.
