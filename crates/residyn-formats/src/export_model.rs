@@ -198,6 +198,12 @@ impl ExportModel {
         operands.any(|node| Some(node.index()) == time)
     }
 
+    /// The effect that a parameter of this name belongs to.
+    pub(super) fn effect_of(&self, parameter: &str) -> Option<&ExportedEffect> {
+        let mut effects = self.effects.iter();
+        effects.find(|effect| effect.parameters.iter().any(|p| p == parameter))
+    }
+
     /// Meaning and interval of each parameter, if known, for a comment.
     pub(super) fn parameter_notes(&self) -> Vec<String> {
         let file: toml::Table = toml::from_str(&self.system.text).expect("a model file is TOML");
@@ -206,14 +212,12 @@ impl ExportModel {
             about.as_str().map(str::to_owned)
         };
         let acts = |name: &str| {
-            let mut effects = self.effects.iter();
-            let effect = effects.find(|effect| effect.parameters.iter().any(|p| p == name))?;
             let ExportedEffect {
                 name,
                 joint,
                 expression,
                 ..
-            } = effect;
+            } = self.effect_of(name)?;
             Some(format!("{name} on joint {joint}: {expression}"))
         };
         let note = |parameter: &Parameter| {

@@ -104,8 +104,7 @@ fn rate(state: &Variable, place: usize) -> Variable {
 /// Parameters of an effect are named below its joint.
 fn parameters(model: &ExportModel, names: &Names) -> impl Iterator<Item = Variable> {
     let place = |name: &str| {
-        let mut effects = model.effects.iter();
-        let effect = effects.find(|effect| effect.parameters.iter().any(|p| p == name));
+        let effect = model.effect_of(name);
         effect.map_or_else(String::new, |effect| {
             format!("joint[{}].{}.", effect.joint, names.field(&effect.name))
         })
