@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use residyn_core::model::{Effect, FileError, Library, Model};
 
-use crate::files::read_text;
+use crate::files::{listed, read_text};
 
 /// Reads a model from a file or, if there is no such file, takes the embedded one of that name. Its effects are looked
 /// up in the library.
@@ -59,16 +59,8 @@ pub fn effect_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
         let message = format!("cannot be read as a folder of effects: {error}");
         FileError::new(folder, None, message)
     };
-    let entries = std::fs::read_dir(folder).map_err(unreadable)?;
-    let mut paths: Vec<PathBuf> = entries
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<Result<_, _>>()
-        .map_err(unreadable)?;
-    paths.retain(|path| {
-        path.extension()
-            .is_some_and(|extension| extension == "toml")
-    });
-    paths.sort();
+    let mut paths = listed(folder).map_err(unreadable)?;
+    paths.retain(|path| path.extension() == Some("toml".as_ref()));
     Ok(paths)
 }
 

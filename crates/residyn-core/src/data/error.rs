@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
@@ -163,6 +163,24 @@ pub enum LogError {
         /// What is wrong with it.
         fault: CellFault,
     },
+}
+
+impl LogError {
+    /// A file that cannot be opened or read.
+    pub fn open(path: &Path) -> impl Fn(io::Error) -> Self {
+        move |why| Self::Open {
+            path: path.to_owned(),
+            why,
+        }
+    }
+
+    /// A file that is not of the form that its beginning suggests: what is wrong, and what to do.
+    pub fn form(path: &Path, fault: impl Into<String>) -> Self {
+        Self::Form {
+            path: path.to_owned(),
+            fault: fault.into(),
+        }
+    }
 }
 
 /// What is wrong with one cell.

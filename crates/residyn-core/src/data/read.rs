@@ -135,13 +135,13 @@ fn standard(path: &Path, table: &mut dyn Table, driven_by: Quantity) -> Result<L
 fn check_joints(path: &Path, joints: usize) -> Result<(), LogError> {
     match joints <= LOG_JOINTS {
         true => Ok(()),
-        false => Err(LogError::Form {
-            path: path.to_owned(),
-            fault: format!(
+        false => Err(LogError::form(
+            path,
+            format!(
                 "has {joints} joints; at most {LOG_JOINTS} are read: give a model that names its columns under \
                  [columns]"
             ),
-        }),
+        )),
     }
 }
 
@@ -170,8 +170,7 @@ fn numbers(
     // Channels that a log of many joints lacks are generated: a short text may become many numbers.
     let bytes = (8 * (1 + 3 * joints) as u64).saturating_mul(numbers.rows as u64);
     if bytes > table.most_bytes() {
-        let fault = too_large();
-        return Err(LogError::Form { path, fault });
+        return Err(LogError::form(&path, too_large()));
     }
     Ok(numbers.columns)
 }

@@ -158,8 +158,7 @@ fn embedded<T>(folder: &str, read: impl Fn(&Path, &str) -> Result<T, FileError>)
 }
 
 fn is_toml(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension == "toml")
+    path.extension() == Some("toml".as_ref())
 }
 
 #[cfg(test)]

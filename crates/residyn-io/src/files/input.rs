@@ -1,6 +1,6 @@
 use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use residyn_core::limits::{SAVED_BYTES, TEXT_BYTES};
 
@@ -58,6 +58,17 @@ fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
         true => Err(invalid(&format!("it has more than {} MB", most >> 20))),
         false => Ok(bytes),
     }
+}
+
+/// The files and folders in a folder, by name.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn listed(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let paths = fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
+    let mut paths: Vec<PathBuf> = paths.collect::<io::Result<_>>()?;
+    paths.sort();
+    Ok(paths)
 }
 
 /// The kind of a file that is not regular, with its article.

@@ -3,7 +3,7 @@ use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use super::fresh::{complete, fresh_file, hidden_beside, remove_folder};
-use super::input::kind;
+use super::input::{kind, listed};
 
 /// As many links as Linux follows.
 const MOST_LINKS: usize = 40;
@@ -88,12 +88,12 @@ pub fn move_contents(from: &Path, to: &Path) -> Result<(), OutputError> {
     if !to.exists() {
         return fs::rename(from, to).map_err(OutputError::of(to));
     }
-    let entries = fs::read_dir(from).map_err(OutputError::of(from))?;
-    let pair = |entry: io::Result<fs::DirEntry>| {
-        let entry = entry.map_err(OutputError::of(from))?;
-        Ok((entry.path(), to.join(entry.file_name())))
+    let entries = listed(from).map_err(OutputError::of(from))?;
+    let pair = |from: PathBuf| {
+        let to = to.join(from.file_name().unwrap_or_default());
+        (from, to)
     };
-    let pairs: Vec<_> = entries.map(pair).collect::<Result<_, _>>()?;
+    let pairs: Vec<_> = entries.into_iter().map(pair).collect();
     for (from, to) in &pairs {
         check_target(from, to).map_err(OutputError::of(to))?;
     }

@@ -1,12 +1,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 use super::part::{Part, RECORD};
 use super::{RunFolder, RunFolderError, Shard};
-use crate::files::{OutputError, write_whole};
+use crate::files::{OutputError, listed, write_whole};
 
 /// What a merged run still lacks.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -31,10 +32,7 @@ pub enum MergeError {
     #[error("{one} and {other} are two results of the same piece of work", one = .one.display(), other = .other.display())]
     TwoResults { one: PathBuf, other: PathBuf },
     #[error("{path} cannot be read: {source}", path = .path.display())]
-    Read {
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    Read { path: PathBuf, source: io::Error },
     #[error("{0}")]
     Folder(#[from] RunFolderError),
     #[error("{0}")]
@@ -105,20 +103,16 @@ fn one_run(parts: &[Part]) -> Result<(), MergeError> {
 /// Add all files within `folder` below `at`. Files whose names begin with a dot are temporary and left by killed runs.
 fn list(folder: &Path, at: &Path, files: &mut Files) -> Result<(), MergeError> {
     let path = folder.join(at);
-    let failed = |source| MergeError::Read {
-        path: path.clone(),
-        source,
-    };
-    for entry in fs::read_dir(&path).map_err(failed)? {
-        let entry = entry.map_err(failed)?;
-        let name = at.join(entry.file_name());
-        if entry.file_name().to_string_lossy().starts_with('.') || name == Path::new(RECORD) {
+    for entry in listed(&path).map_err(unreadable(&path))? {
+        let own = entry.file_name().unwrap_or_default();
+        let name = at.join(own);
+        if own.to_string_lossy().starts_with('.') || name == Path::new(RECORD) {
             continue;
         }
-        if entry.path().is_dir() {
+        if entry.is_dir() {
             list(folder, &name, files)?;
         } else {
-            files.entry(name).or_default().push(entry.path());
+            files.entry(name).or_default().push(entry);
         }
     }
     Ok(())
@@ -126,17 +120,9 @@ fn list(folder: &Path, at: &Path, files: &mut Files) -> Result<(), MergeError> {
 
 /// The merged contents of the file of this name.
 fn contents(name: &Path, sources: &[PathBuf]) -> Result<Vec<u8>, MergeError> {
-    let read = |path: &PathBuf| {
-        fs::read(path).map_err(|source| MergeError::Read {
-            path: path.clone(),
-            source,
-        })
-    };
+    let read = |path: &PathBuf| fs::read(path).map_err(unreadable(path));
     let all: Vec<Vec<u8>> = sources.iter().map(read).collect::<Result<_, _>>()?;
-    if name
-        .extension()
-        .is_some_and(|extension| extension == "jsonl")
-    {
+    if name.extension() == Some("jsonl".as_ref()) {
         return Ok(joined(&all));
     }
     match all.iter().position(|other| *other != all[0]) {
@@ -145,6 +131,13 @@ fn contents(name: &Path, sources: &[PathBuf]) -> Result<Vec<u8>, MergeError> {
             other: sources[other].clone(),
         }),
         None => Ok(all.into_iter().next().unwrap_or_default()),
+    }
+}
+
+fn unreadable(path: &Path) -> impl FnOnce(io::Error) -> MergeError {
+    move |source| MergeError::Read {
+        path: path.to_owned(),
+        source,
     }
 }
 

@@ -1,7 +1,6 @@
 //! LeRobot data sets, versions 2 and 3: a folder of many episodes in Parquet, one of which is read as a log.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +8,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::parquet::{List, lists};
-use crate::files::{self, read_saved};
+use crate::files::{self, listed, read_saved};
 use residyn_core::data::Arrays;
 use residyn_core::data::LogError;
 
@@ -66,14 +65,14 @@ impl Episode {
     /// # Errors
     /// A data set that cannot be read, no such episode, and several if none is named.
     pub fn read(&self) -> Result<Arrays, LogError> {
-        let files = self.files().map_err(|why| self.unreadable(why))?;
+        let files = self.files().map_err(LogError::open(&self.path))?;
         let (mut frames, info) = (self.frames(&files)?, self.info()?);
         let mut of = |name: &str| {
             let list = frames.remove(name);
             list.map_or(Ok(Vec::new()), |list| list.columns(&self.path))
         };
         let packed: io::Result<u64> = files.iter().map(|file| files::size(file)).sum();
-        let mut table = Arrays::of(packed.map_err(|why| self.unreadable(why))?);
+        let mut table = Arrays::of(packed.map_err(LogError::open(&self.path))?);
         for time in of(TIME)? {
             table.add("time", time);
         }
@@ -126,24 +125,21 @@ impl Episode {
     /// The files of the data set; in version 2 only the file of the episode.
     fn files(&self) -> io::Result<Vec<PathBuf>> {
         let mut files = Vec::new();
-        for chunk in fs::read_dir(self.set.join("data"))? {
-            for file in fs::read_dir(chunk?.path())? {
-                files.push(file?.path());
-            }
+        for chunk in listed(&self.set.join("data"))? {
+            files.extend(listed(&chunk)?);
         }
-        files.sort();
         let own = self
             .number
             .map(|number| format!("episode_{number:06}.parquet"));
-        let is_own = |file: &&PathBuf| own.as_ref().is_some_and(|own| file.ends_with(own));
-        Ok(files
-            .iter()
-            .find(is_own)
-            .map_or_else(|| files.clone(), |own| vec![own.clone()]))
+        let is_own = |file: &PathBuf| own.as_ref().is_some_and(|own| file.ends_with(own));
+        if let Some(own) = files.iter().position(is_own) {
+            files = vec![files.swap_remove(own)];
+        }
+        Ok(files)
     }
 
     fn info(&self) -> Result<Info, LogError> {
-        let text = read_saved(&self.set.join(INFO)).map_err(|why| self.unreadable(why))?;
+        let text = read_saved(&self.set.join(INFO)).map_err(LogError::open(&self.path))?;
         serde_json::from_slice(&text).map_err(|why| {
             self.fault(format!(
                 "{INFO} is damaged: {why}; write the data set again"
@@ -151,18 +147,8 @@ impl Episode {
         })
     }
 
-    fn unreadable(&self, why: io::Error) -> LogError {
-        LogError::Open {
-            path: self.path.clone(),
-            why,
-        }
-    }
-
     fn fault(&self, fault: String) -> LogError {
-        LogError::Form {
-            path: self.path.clone(),
-            fault,
-        }
+        LogError::form(&self.path, fault)
     }
 }
 

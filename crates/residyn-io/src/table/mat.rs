@@ -26,12 +26,10 @@ pub(super) fn read(path: &Path, source: &Source) -> Result<Arrays, LogError> {
     let bytes = BufReader::with_capacity(BLOCK, bytes);
     match add_all(&mut table, bytes) {
         Ok(()) => Ok(table.table),
-        Err(fault) => Err(LogError::Form {
-            path: path.to_owned(),
-            fault: format!(
-                "{fault}; save it again: save('run.mat', 'time', 'q', 'qd', 'tau', '-v7')"
-            ),
-        }),
+        Err(fault) => Err(LogError::form(
+            path,
+            format!("{fault}; save it again: save('run.mat', 'time', 'q', 'qd', 'tau', '-v7')"),
+        )),
     }
 }
 

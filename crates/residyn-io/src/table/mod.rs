@@ -72,18 +72,15 @@ const FOREIGN: [(&[u8], &str); 7] = [
 /// # Errors
 /// A file that cannot be read, that is of none of the formats, or that has too many columns.
 pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
-    let damaged = || LogError::Form {
-        path: path.to_owned(),
-        fault: "is damaged: its offsets and lengths contradict each other; write it again"
-            .to_owned(),
+    let damaged = || {
+        let fault = "is damaged: its offsets and lengths contradict each other; write it again";
+        LogError::form(path, fault)
     };
     let table = guarded(|| read(path, columns)).ok_or_else(damaged)??;
     let found = table.names().len();
     if found > LOG_COLUMNS {
-        return Err(LogError::Form {
-            path: path.to_owned(),
-            fault: format!("has {found} columns; at most {LOG_COLUMNS} are read"),
-        });
+        let fault = format!("has {found} columns; at most {LOG_COLUMNS} are read");
+        return Err(LogError::form(path, fault));
     }
     Ok(table)
 }
@@ -115,10 +112,7 @@ fn read(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
         }
     }
     if let Some((_, remedy)) = FOREIGN.iter().find(|(known, _)| begin.starts_with(known)) {
-        return Err(LogError::Form {
-            path: path.to_owned(),
-            fault: (*remedy).to_owned(),
-        });
+        return Err(LogError::form(path, *remedy));
     }
     if begin.starts_with(mat::MAGIC) {
         return Ok(Box::new(mat::read(path, &source)?));

@@ -15,16 +15,10 @@ use crate::files;
 /// # Errors
 /// An archive that cannot be read, and arrays of neither numbers nor texts.
 pub(super) fn read(path: &Path) -> Result<Arrays, LogError> {
-    let unreadable = |why| LogError::Open {
-        path: path.to_owned(),
-        why,
-    };
-    let file = files::open(path).map_err(unreadable)?;
+    let unreadable = LogError::open(path);
+    let file = files::open(path).map_err(&unreadable)?;
     let packed = file.metadata().map_err(unreadable)?.len();
-    table(packed, BufReader::new(file)).map_err(|fault| LogError::Form {
-        path: path.to_owned(),
-        fault,
-    })
+    table(packed, BufReader::new(file)).map_err(|fault| LogError::form(path, fault))
 }
 
 fn table(packed: u64, archive: impl Read + Seek) -> Result<Arrays, String> {

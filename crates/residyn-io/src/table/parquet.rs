@@ -20,10 +20,7 @@ use residyn_core::limits::{LOG_COLUMNS, unpacked_bytes};
 /// # Errors
 /// A file that is damaged, or whose lists are of different lengths.
 pub(super) fn read(path: &Path) -> Result<Arrays, LogError> {
-    let packed = files::size(path).map_err(|why| LogError::Open {
-        path: path.to_owned(),
-        why,
-    })?;
+    let packed = files::size(path).map_err(LogError::open(path))?;
     let mut table = Arrays::of(packed);
     for list in lists(path, |_| true)? {
         let (name, is_list) = (list.name.clone(), list.is_list);
@@ -80,14 +77,14 @@ impl List {
         let width = self.columns.len();
         match self.ragged {
             None => Ok(self.columns),
-            Some((row, length)) => Err(LogError::Form {
-                path: path.to_owned(),
-                fault: format!(
+            Some((row, length)) => Err(LogError::form(
+                path,
+                format!(
                     "row {} of {:?} has {length} number(s) but the first has {width}; write the same number in every row",
                     row + 1,
                     self.name,
                 ),
-            }),
+            )),
         }
     }
 
@@ -138,11 +135,10 @@ impl List {
 /// # Errors
 /// A file that is damaged.
 pub(super) fn lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>, LogError> {
-    let damaged = |why: String| LogError::Form {
-        path: path.to_owned(),
-        fault: format!("is not a complete Parquet file: {why}; write it again"),
-    };
-    read_lists(path, is_wanted).map_err(|why| damaged(why.to_string()))
+    read_lists(path, is_wanted).map_err(|why| {
+        let fault = format!("is not a complete Parquet file: {why}; write it again");
+        LogError::form(path, fault)
+    })
 }
 
 fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>, ParquetError> {

@@ -35,10 +35,7 @@ impl Source {
         });
         Ok(Self {
             path: path.to_owned(),
-            size: size.map_err(|why| LogError::Open {
-                path: path.to_owned(),
-                why,
-            })?,
+            size: size.map_err(LogError::open(path))?,
             is_packed: begin == GZIP,
         })
     }
@@ -79,13 +76,9 @@ impl Source {
 
     /// Why it cannot be read, by the name that its user gave it.
     pub fn fault(&self, path: &Path, why: io::Error) -> LogError {
-        let path = path.to_owned();
         match self.is_packed {
-            true => LogError::Form {
-                path,
-                fault: format!("cannot be unpacked: {why}"),
-            },
-            false => LogError::Open { path, why },
+            true => LogError::form(path, format!("cannot be unpacked: {why}")),
+            false => LogError::open(path)(why),
         }
     }
 }

@@ -15,11 +15,11 @@ use residyn_core::data::LogError;
 const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
 pub(super) fn read(path: &Path, recording: &mut Recording) -> Result<(), LogError> {
-    add(path, recording).map_err(|why| LogError::Form {
-        path: path.to_owned(),
-        fault: format!(
+    add(path, recording).map_err(|why| {
+        let fault = format!(
             "is not a complete rosbag2: {why}; record it again, or save what is left: `sqlite3 run.db3 .recover | sqlite3 mended.db3`"
-        ),
+        );
+        LogError::form(path, fault)
     })
 }
 

@@ -24,16 +24,13 @@ pub(super) fn read(path: &Path, recording: &mut Recording) -> Result<(), LogErro
             ));
             Ok(())
         }
-        Err(McapError::Io(why)) => Err(LogError::Open {
-            path: path.to_owned(),
-            why,
-        }),
-        Err(why) => Err(LogError::Form {
-            path: path.to_owned(),
-            fault: format!(
+        Err(McapError::Io(why)) => Err(LogError::open(path)(why)),
+        Err(why) => Err(LogError::form(
+            path,
+            format!(
                 "is damaged: {why}; save what is left: `mcap recover run.mcap --output mended.mcap`"
             ),
-        }),
+        )),
     }
 }
 

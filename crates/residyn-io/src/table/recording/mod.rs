@@ -203,10 +203,7 @@ impl Recording {
     }
 
     fn fault(&self, fault: String) -> LogError {
-        LogError::Form {
-            path: self.path.clone(),
-            fault,
-        }
+        LogError::form(&self.path, fault)
     }
 }
 
