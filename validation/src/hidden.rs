@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::force::Force;
-use super::friction::{DryFriction, Presliding};
+use super::laws::{DRY, Law, SMOOTH};
 use super::machine::Machine;
 use super::mechanics::Mechanics;
+use super::presliding::Presliding;
 use super::transmission::Transmission;
 use residyn_core::data::Joint;
 
@@ -33,88 +33,20 @@ pub struct Hidden {
 }
 
 impl Hidden {
+    pub(crate) fn new(name: &str, joint: Joint, values: &[(&str, f64)]) -> Self {
+        let values = values.iter();
+        Self {
+            name: name.to_owned(),
+            joint,
+            values: values
+                .map(|(name, value)| ((*name).to_owned(), *value))
+                .collect(),
+        }
+    }
+
     pub fn label(&self) -> Label {
         let parameters: Vec<&str> = self.values.keys().map(String::as_str).collect();
         label(&self.name, self.joint, &parameters.join(", "))
-    }
-}
-
-/// The numbers of an effect that have not been used yet.
-struct Numbers<'h> {
-    of: &'h Hidden,
-    left: BTreeMap<String, f64>,
-}
-
-impl Numbers<'_> {
-    fn take(&mut self, name: &str) -> Result<f64, String> {
-        let missing = || format!("`{}` needs `{name}`", self.of.name);
-        self.left.remove(name).ok_or_else(missing)
-    }
-
-    /// The smooth torque of the effect, if it has one.
-    fn force(&mut self) -> Result<Option<Force>, String> {
-        let of = self.of;
-        let mut n = |name: &str| self.take(name);
-        Ok(Some(match of.name.as_str() {
-            "viscous_friction" => Force::Viscous { b: n("b")? },
-            "asymmetric_friction" => Force::TwoSlopes {
-                b_p: n("b_p")?,
-                b_n: n("b_n")?,
-            },
-            "degressive_friction" => Force::Degressive {
-                rise: n("F_d")?,
-                bend: n("v_d")?,
-            },
-            "quadratic_drag" => Force::QuadraticDrag { c: n("c")? },
-            "cubic_damping" => Force::CubicDamping { c: n("c")? },
-            "joint_spring" => Force::Spring {
-                k: n("k")?,
-                q_0: n("q_0")?,
-            },
-            "constant_torque" => Force::Constant { tau_0: n("tau_0")? },
-            "cogging_torque" | "fractional_ripple" => Force::Ripple {
-                amplitude: n("A")?,
-                periods: n("N")?,
-                phase: n("phase")?,
-            },
-            "periodic_disturbance" => Force::Hum {
-                amplitude: n("A")?,
-                frequency_hz: n("f")?,
-                phase: n("phase")?,
-            },
-            _ => return Ok(None),
-        }))
-    }
-
-    /// The dry friction of the effect, if it has any.
-    fn dry_friction(&mut self) -> Result<Option<DryFriction>, String> {
-        let of = self.of;
-        let mut n = |name: &str| self.take(name);
-        Ok(Some(match of.name.as_str() {
-            "coulomb_friction" => DryFriction::Coulomb { level: n("F_c")? },
-            "stribeck_friction" => DryFriction::Stribeck {
-                f_c: n("F_c")?,
-                f_s: n("F_s")?,
-                v_s: n("v_s")?,
-            },
-            "asymmetric_friction" => DryFriction::Asymmetric {
-                forward: n("F_p")?,
-                backward: n("F_n")?,
-            },
-            "load_friction" => DryFriction::Load { share: n("k")? },
-            "uneven_friction" => DryFriction::Uneven {
-                level: n("F")?,
-                share: n("a")?,
-            },
-            _ => return Ok(None),
-        }))
-    }
-
-    fn none_left(&self) -> Result<(), String> {
-        match self.left.keys().next() {
-            Some(name) => Err(format!("`{}` has no `{name}`", self.of.name)),
-            None => Ok(()),
-        }
     }
 }
 
@@ -141,23 +73,31 @@ impl Machine {
             return self.shift(hidden);
         }
         let j = hidden.joint.index();
-        let mut numbers = Numbers {
-            of: hidden,
-            left: hidden.values.clone(),
+        let mut left = hidden.values.clone();
+        let mut take = |name: &str| {
+            let missing = || format!("`{}` needs `{name}`", hidden.name);
+            left.remove(name).ok_or_else(missing)
         };
-        let (force, friction) = (numbers.force()?, numbers.dry_friction()?);
-        if force.is_none() && friction.is_none() {
-            self.change(hidden, &mut numbers)?;
+        let smooth = Law::of(SMOOTH, &hidden.name, &mut take)?;
+        let dry = Law::of(DRY, &hidden.name, &mut take)?;
+        if smooth.is_none() && dry.is_none() {
+            self.change(hidden, take)?;
         }
-        self.forces.extend(force.map(|force| (j, force)));
-        self.dry.extend(friction.map(|friction| (j, friction)));
-        numbers.none_left()
+        self.smooth.extend(smooth.map(|law| (j, law)));
+        self.dry.extend(dry.map(|law| (j, law)));
+        match left.keys().next() {
+            Some(name) => Err(format!("`{}` has no `{name}`", hidden.name)),
+            None => Ok(()),
+        }
     }
 
-    /// Add an effect that is neither a smooth torque nor dry friction.
-    fn change(&mut self, hidden: &Hidden, numbers: &mut Numbers<'_>) -> Result<(), String> {
+    /// Add an effect that is neither a smooth torque nor dry friction; `n` takes its numbers by name.
+    fn change(
+        &mut self,
+        hidden: &Hidden,
+        mut n: impl FnMut(&str) -> Result<f64, String>,
+    ) -> Result<(), String> {
         let j = hidden.joint.index();
-        let mut n = |name: &str| numbers.take(name);
         let drive = &mut self.drives[j];
         match hidden.name.as_str() {
             "presliding" => {
@@ -195,6 +135,16 @@ impl Machine {
 }
 
 #[cfg(test)]
+impl Machine {
+    /// With an effect on one of its joints, counted from 0.
+    pub(crate) fn hiding(mut self, joint: usize, name: &str, values: &[(&str, f64)]) -> Self {
+        let effect = Hidden::new(name, Joint::at(joint), values);
+        self.add(&effect).unwrap();
+        self
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -205,14 +155,7 @@ mod tests {
     use residyn_core::data::Joint;
 
     fn hidden(name: &str, values: &[(&str, f64)]) -> Hidden {
-        Hidden {
-            name: name.to_owned(),
-            joint: Joint::at(0),
-            values: values
-                .iter()
-                .map(|(name, value)| ((*name).to_owned(), *value))
-                .collect(),
-        }
+        Hidden::new(name, Joint::at(0), values)
     }
 
     /// Change of the first joint's acceleration due to this effect, at one state and torque.

@@ -1,9 +1,9 @@
 use std::collections::BTreeMap;
 
 use super::drive::{Approach, Drive};
-use super::force::Force;
-use super::friction::{DryFriction, Presliding};
+use super::laws::{At, Law};
 use super::mechanics::{Mechanics, Pair};
+use super::presliding::Presliding;
 use super::transmission::Transmission;
 
 /// A rig with its undeclared effects.
@@ -15,8 +15,8 @@ pub struct Machine {
     /// Rotor inertia of each joint, which acts on that joint alone \[kg m^2\].
     pub rotor: Pair,
     /// Each with the joint that it acts on.
-    pub forces: Vec<(usize, Force)>,
-    pub dry: Vec<(usize, DryFriction)>,
+    pub smooth: Vec<(usize, Law)>,
+    pub dry: Vec<(usize, Law)>,
     pub presliding: Vec<(usize, Presliding)>,
     pub transmissions: [Option<Transmission>; 2],
     pub drives: [Drive; 2],
@@ -77,7 +77,7 @@ impl Machine {
             mechanics,
             tilt: 0.0,
             rotor: [0.0; 2],
-            forces: Vec::new(),
+            smooth: Vec::new(),
             dry: Vec::new(),
             presliding: Vec::new(),
             transmissions: [None, None],
@@ -139,8 +139,13 @@ impl Machine {
             };
             balance.free[j] += balance.load[j];
         }
-        for (j, force) in &self.forces {
-            balance.free[*j] += force.at(state.q[*j], state.v[*j], time);
+        for (j, law) in &self.smooth {
+            balance.free[*j] += law.at(At {
+                q: state.q[*j],
+                v: state.v[*j],
+                t: time,
+                ..At::default()
+            });
         }
         for (j, friction) in &self.presliding {
             balance.free[*j] += friction.torque(state.bristle[*j]);
@@ -153,8 +158,14 @@ impl Machine {
     /// Total dry-friction level of a joint against motion in `direction` \[N m\].
     fn level(&self, joint: usize, direction: f64, state: &State, load: f64) -> f64 {
         let own = self.dry.iter().filter(|(of, _)| *of == joint);
-        own.map(|(_, friction)| friction.level(direction, state.q[joint], state.v[joint], load))
-            .sum()
+        let at = At {
+            q: state.q[joint],
+            v: state.v[joint],
+            load,
+            direction,
+            ..At::default()
+        };
+        own.map(|(_, law)| law.at(at)).sum()
     }
 
     /// Accelerations while the joints move in these directions; held joints have none.

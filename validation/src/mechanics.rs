@@ -94,20 +94,9 @@ impl Mechanics {
 
     /// Give a parameter another value; `None` if there is no such parameter.
     pub fn set(&mut self, name: &str, value: f64) -> Option<()> {
-        let slot = match (self, name) {
-            (Self::Pendulum { inertia, .. }, "inertia") => inertia,
-            (Self::Pendulum { moment, .. }, "moment") => moment,
-            (Self::DoublePendulum { m1, .. }, "m1") => m1,
-            (Self::DoublePendulum { m2, .. }, "m2") => m2,
-            (Self::DoublePendulum { l1, .. }, "l1") => l1,
-            (Self::DoublePendulum { lc1, .. }, "lc1") => lc1,
-            (Self::DoublePendulum { lc2, .. }, "lc2") => lc2,
-            (Self::DoublePendulum { i1, .. }, "I1") => i1,
-            (Self::DoublePendulum { i2, .. }, "I2") => i2,
-            (Self::Pendulum { g, .. } | Self::DoublePendulum { g, .. }, "g") => g,
-            _ => return None,
-        };
-        *slot = value;
+        let mut fields = serde_json::to_value(&*self).ok()?;
+        *fields.get_mut(name)? = value.into();
+        *self = serde_json::from_value(fields).ok()?;
         Some(())
     }
 

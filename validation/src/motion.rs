@@ -97,12 +97,9 @@ fn halve(long: f64, has_happened: impl Fn(f64) -> bool) -> f64 {
 mod tests {
     use super::STEP_S;
     use crate::drive::Approach;
-    use crate::force::Force;
-    use crate::friction::{DryFriction, Presliding};
     use crate::machine::{Machine, State};
     use crate::mechanics::Mechanics;
     use crate::mechanics::tests::{double_pendulum, energy, pendulum};
-    use crate::transmission::Transmission;
 
     fn constant(torque: [f64; 2]) -> [Approach; 2] {
         torque.map(|target| Approach {
@@ -121,18 +118,12 @@ mod tests {
 
     /// All kinds of friction and drives at once, for two seconds of swinging.
     fn end_of_a_rich_motion(step_s: f64) -> State {
-        let mut machine = Machine::bare(double_pendulum());
-        machine.dry.push((0, DryFriction::Coulomb { level: 0.8 }));
-        machine.dry.push((
-            1,
-            DryFriction::Stribeck {
-                f_c: 0.3,
-                f_s: 0.5,
-                v_s: 0.2,
-            },
-        ));
-        machine.forces.push((0, Force::Viscous { b: 0.1 }));
-        machine.drives[1].lag = 0.03;
+        let stribeck = [("F_c", 0.3), ("F_s", 0.5), ("v_s", 0.2)];
+        let machine = Machine::bare(double_pendulum())
+            .hiding(0, "coulomb_friction", &[("F_c", 0.8)])
+            .hiding(1, "stribeck_friction", &stribeck)
+            .hiding(0, "viscous_friction", &[("b", 0.1)])
+            .hiding(1, "actuator_lag", &[("T", 0.03)]);
         let mut state = moving([0.7, -0.4], [0.0, 2.0]);
         for (k, torque) in [[3.0, -1.0], [-4.0, 1.0], [0.0, 0.0], [2.0, 2.0]]
             .iter()
@@ -181,8 +172,7 @@ mod tests {
 
     #[test]
     fn static_friction_holds_a_joint_exactly() {
-        let mut machine = Machine::bare(pendulum());
-        machine.dry.push((0, DryFriction::Coulomb { level: 0.5 }));
+        let machine = Machine::bare(pendulum()).hiding(0, "coulomb_friction", &[("F_c", 0.5)]);
         let mut state = State::at_rest([0.1, 0.0]);
         // Gravity pulls by 0.294 N m.
         machine.advance(&mut state, 0.0, 2.0, &constant([0.79, 0.0]), STEP_S);
@@ -200,8 +190,7 @@ mod tests {
             moment: 0.0,
             g: 9.81,
         };
-        let mut machine = Machine::bare(mechanics);
-        machine.dry.push((0, DryFriction::Coulomb { level: 0.3 }));
+        let machine = Machine::bare(mechanics).hiding(0, "coulomb_friction", &[("F_c", 0.3)]);
         let mut state = moving([1.0, 0.0], [-1.5, 0.0]);
         machine.advance(&mut state, 0.0, 2.0, &constant([0.0; 2]), STEP_S);
         let way = 0.5 * 0.2 * 1.5 * 1.5 / 0.3;
@@ -211,12 +200,8 @@ mod tests {
 
     #[test]
     fn asymmetric_friction_holds_more_one_way_than_the_other() {
-        let mut machine = Machine::bare(pendulum());
-        let friction = DryFriction::Asymmetric {
-            forward: 0.5,
-            backward: 0.1,
-        };
-        machine.dry.push((0, friction));
+        let friction = [("F_p", 0.5), ("F_n", 0.1), ("b_p", 0.0), ("b_n", 0.0)];
+        let machine = Machine::bare(pendulum()).hiding(0, "asymmetric_friction", &friction);
         let moves = |torque: f64| {
             let mut state = State::at_rest([0.0; 2]);
             machine.advance(&mut state, 0.0, 0.01, &constant([torque, 0.0]), STEP_S);
@@ -231,32 +216,29 @@ mod tests {
     #[test]
     fn a_held_joint_transmits_its_reaction_to_the_moving_one() {
         let mechanics = double_pendulum();
-        let mut machine = Machine::bare(mechanics.clone());
-        machine.dry.push((1, DryFriction::Coulomb { level: 50.0 }));
+        let rough = |level: f64| {
+            let bare = Machine::bare(mechanics.clone());
+            bare.hiding(1, "coulomb_friction", &[("F_c", level)])
+        };
         let mut state = moving([0.8, 0.4], [0.0, 0.0]);
         let before = energy(&mechanics, state.q, state.v);
-        machine.advance(&mut state, 0.0, 1.0, &constant([0.0; 2]), STEP_S);
+        rough(50.0).advance(&mut state, 0.0, 1.0, &constant([0.0; 2]), STEP_S);
         // A double pendulum with a locked elbow is a pendulum, without loss.
         assert_eq!((state.q[1], state.v[1]), (0.4, 0.0));
         assert!(state.v[0].abs() > 0.1);
         let after = energy(&mechanics, state.q, state.v);
         assert!((after - before).abs() < 1e-8);
         // With less friction the elbow slips during the swing.
-        machine.dry[0].1 = DryFriction::Coulomb { level: 0.2 };
         let mut state = moving([0.8, 0.4], [0.0, 0.0]);
-        machine.advance(&mut state, 0.0, 1.0, &constant([0.0; 2]), STEP_S);
+        rough(0.2).advance(&mut state, 0.0, 1.0, &constant([0.0; 2]), STEP_S);
         assert!((state.q[1] - 0.4).abs() > 0.01);
     }
 
     #[test]
     fn presliding_friction_springs_back() {
-        let mut machine = Machine::bare(pendulum());
-        let friction = Presliding {
-            level: 0.5,
-            stiffness: 20.0,
-        };
-        machine.presliding.push((0, friction));
-        machine.forces.push((0, Force::Viscous { b: 2.0 }));
+        let machine = Machine::bare(pendulum())
+            .hiding(0, "presliding", &[("F_c", 0.5), ("sigma", 20.0)])
+            .hiding(0, "viscous_friction", &[("b", 2.0)]);
         let mut state = State::at_rest([0.0; 2]);
         machine.advance(&mut state, 0.0, 5.0, &constant([0.2, 0.0]), STEP_S);
         let pushed = state.q[0];
@@ -267,14 +249,13 @@ mod tests {
 
     #[test]
     fn backlash_transmits_no_torque_within_its_play() {
-        let mut machine = Machine::bare(pendulum());
-        machine.transmissions[0] = Some(Transmission::backlash(0.02));
+        let machine = Machine::bare(pendulum()).hiding(0, "backlash", &[("delta", 0.02)]);
         let mut state = State::at_rest([0.0; 2]);
         machine.advance(&mut state, 0.0, 2e-3, &constant([0.5, 0.0]), STEP_S);
         assert_eq!(state.q[0], 0.0);
         // The motor alone: half of torque over inertia, times time squared.
         assert!((state.motor_q[0] - 0.5 * 0.5 / 0.002 * 4e-6).abs() < 1e-9);
-        machine.forces.push((0, Force::Viscous { b: 1.0 }));
+        let machine = machine.hiding(0, "viscous_friction", &[("b", 1.0)]);
         machine.advance(&mut state, 2e-3, 10.0, &constant([0.5, 0.0]), STEP_S);
         let ahead = state.motor_q[0] - state.q[0];
         // Half of the play, plus the deflection of the contact.

@@ -1,11 +1,9 @@
 //! Recording a log: drive the rig, read its sensors.
 
-use std::path::PathBuf;
-
 use rand::{Rng, RngExt};
 
 use super::condition::{Condition, Driving, Loop};
-use super::excitation::{Chirp, Controller, Multisine, Steps};
+use super::excitation::{Controller, Multisine, Signal, chirp, steps};
 use super::machine::{Machine, State};
 use super::mechanics::Pair;
 use super::motion::STEP_S;
@@ -18,35 +16,39 @@ const STRENGTHS: [f64; 6] = [1.2, 0.5, 0.8, 1.0, 0.7, 0.9];
 
 /// The source of the torque.
 enum Source {
-    Multisine(Multisine),
-    Chirp(Chirp),
-    Steps(Steps),
+    Open(Signal),
     Closed(Multisine, Controller),
 }
 
 impl Source {
     fn draw(driving: &Driving, how: Loop, effort: &Effort, j: usize, rng: &mut impl Rng) -> Self {
-        let (size, band) = (effort.strength * driving.torque[j], driving.torque_hz);
+        let Effort { strength, seconds } = *effort;
+        let (size, band) = (strength * driving.torque[j], driving.torque_hz);
+        let mut multisine = |size: f64| -> Signal {
+            let torque = Multisine::draw(size, band, rng);
+            Box::new(move |time| torque.at(time))
+        };
         match how {
-            Loop::Open => Self::Multisine(Multisine::draw(size, band, rng)),
-            Loop::Release => Self::Multisine(Multisine::draw(0.5 * size, band, rng)),
-            Loop::Chirp => Self::Chirp(Chirp::draw(size, band, effort.seconds, rng)),
-            Loop::Steps => Self::Steps(Steps::draw(size, band, effort.seconds, rng)),
+            Loop::Open => Self::Open(multisine(size)),
+            Loop::Release => Self::Open(multisine(0.5 * size)),
+            Loop::Chirp => Self::Open(chirp(size, band, seconds, rng)),
+            Loop::Steps => Self::Open(steps(size, band, seconds, rng)),
             Loop::Closed => {
-                let size = effort.strength * driving.reference[j];
-                let reference = Multisine::draw(size, driving.reference_hz, rng);
-                let controller =
-                    Controller::new(driving.stiffness[j], driving.damping[j], driving.limit[j]);
-                Self::Closed(reference, controller)
+                let size = strength * driving.reference[j];
+                let controller = Controller {
+                    stiffness: driving.stiffness[j],
+                    damping: driving.damping[j],
+                    limit: driving.limit[j],
+                    speed: Speed::default(),
+                };
+                Self::Closed(Multisine::draw(size, driving.reference_hz, rng), controller)
             }
         }
     }
 
     fn command(&mut self, measured: f64, time: f64, dt: f64) -> f64 {
         match self {
-            Self::Multisine(torque) => torque.at(time),
-            Self::Chirp(torque) => torque.at(time),
-            Self::Steps(torque) => torque.at(time),
+            Self::Open(torque) => torque(time),
             Self::Closed(reference, controller) => {
                 let wanted = [reference.at(time), reference.rate(time)];
                 controller.command(measured, wanted, dt)
@@ -101,7 +103,8 @@ impl Machine {
         let mut speeds = vec![Speed::default(); joints];
         let mut wires = Wires::default();
         let mut state = start(driving, how, effort.strength, rng);
-        let mut log = empty(index, joints);
+        let mut log = Log::empty(joints);
+        log.path = log_name(index).into();
         let (mut time, mut dt) = (0.0, 1.0 / condition.rate_hz);
         for row in 0..rows {
             // The first and the last row are always kept, so that the log has its intended length.
@@ -144,25 +147,24 @@ pub fn log_name(index: usize) -> String {
     format!("log{}.csv", index + 1)
 }
 
-fn empty(index: usize, joints: usize) -> Log {
-    Log {
-        path: PathBuf::from(log_name(index)),
-        ..Log::empty(joints)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     use crate::condition::{Condition, Driving, Loop};
-    use crate::force::Force;
-    use crate::friction::DryFriction;
     use crate::machine::Machine;
+    use crate::mechanics::Mechanics;
     use crate::mechanics::tests::pendulum;
     use crate::sensors::Flaws;
     use residyn_core::data::Log;
+
+    /// Without gravity.
+    const WHEEL: Mechanics = Mechanics::Pendulum {
+        inertia: 1.0,
+        moment: 0.0,
+        g: 9.81,
+    };
 
     fn driving() -> Driving {
         Driving {
@@ -201,8 +203,7 @@ mod tests {
     #[test]
     fn a_delay_of_whole_steps_shifts_the_motion_exactly() {
         let sound = Machine::bare(pendulum());
-        let mut late = sound.clone();
-        late.drives[0].delay = 0.03;
+        let late = sound.clone().hiding(0, "actuator_delay", &[("d", 0.03)]);
         let open = condition(Loop::Open);
         let (early, late) = (record(&sound, &open, 0.0), record(&late, &open, 0.0));
         assert_eq!(early.tau, late.tau);
@@ -213,12 +214,7 @@ mod tests {
 
     #[test]
     fn a_delay_of_part_of_a_step_splits_the_step_between_two_torques() {
-        let mut machine = Machine::bare(crate::mechanics::Mechanics::Pendulum {
-            inertia: 1.0,
-            moment: 0.0,
-            g: 9.81,
-        });
-        machine.drives[0].delay = 0.0137;
+        let machine = Machine::bare(WHEEL).hiding(0, "actuator_delay", &[("d", 0.0137)]);
         let mut condition = condition(Loop::Open);
         condition.seconds = 1.0;
         let log = record(&machine, &condition, 0.0);
@@ -236,12 +232,7 @@ mod tests {
 
     #[test]
     fn a_lag_follows_its_own_equation() {
-        let mut machine = Machine::bare(crate::mechanics::Mechanics::Pendulum {
-            inertia: 1.0,
-            moment: 0.0,
-            g: 9.81,
-        });
-        machine.drives[0].lag = 0.05;
+        let machine = Machine::bare(WHEEL).hiding(0, "actuator_lag", &[("T", 0.05)]);
         let log = record(&machine, &condition(Loop::Open), 0.0);
         // Forward steps of 10 us of T tau' + tau = u.
         let (mut q, mut v, mut tau) = (0.0, 0.0, 0.0);
@@ -269,8 +260,7 @@ mod tests {
     fn closed_loop_torque_depends_on_the_rig_and_respects_its_limit() {
         let closed = condition(Loop::Closed);
         let plain = record(&Machine::bare(pendulum()), &closed, 0.0);
-        let mut rough = Machine::bare(pendulum());
-        rough.dry.push((0, DryFriction::Coulomb { level: 0.3 }));
+        let rough = Machine::bare(pendulum()).hiding(0, "coulomb_friction", &[("F_c", 0.3)]);
         let rough = record(&rough, &closed, 0.0);
         assert!(largest_difference(&plain.tau[0], &rough.tau[0]) > 0.1);
         assert!(plain.tau[0].iter().all(|tau| tau.abs() <= 4.0));
@@ -279,8 +269,7 @@ mod tests {
 
     #[test]
     fn encoders_have_the_configured_noise_and_step_and_velocities_are_differences() {
-        let mut machine = Machine::bare(pendulum());
-        machine.forces.push((0, Force::Viscous { b: 0.1 }));
+        let machine = Machine::bare(pendulum()).hiding(0, "viscous_friction", &[("b", 0.1)]);
         let clean = record(&machine, &condition(Loop::Open), 0.0);
         let mut noisy = condition(Loop::Open);
         (noisy.noise, noisy.quantum) = (1e-3, 0.0);

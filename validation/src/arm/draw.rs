@@ -33,7 +33,7 @@ impl Arm {
             Lacks::LoadFriction => {
                 // A joint where the bodies load the gear.
                 let joint = joints[rng.random_range(1..3)];
-                effects.push(hidden(
+                effects.push(Hidden::new(
                     "load_friction",
                     joint,
                     &[("k", rng.random_range(0.06..0.2))],
@@ -51,7 +51,7 @@ impl Arm {
                     ("J", 0.1 * share() / speed.powi(2)),
                     ("r", ratio),
                 ];
-                effects.push(hidden("joint_coupling", joint, &values));
+                effects.push(Hidden::new("joint_coupling", joint, &values));
             }
             Lacks::Payload => {
                 let (mass, reach) = bodies.tip();
@@ -61,7 +61,7 @@ impl Arm {
                     ("y", reach * rng.random_range(-1.0..1.0)),
                     ("z", reach + rng.random_range(0.05..0.15)),
                 ];
-                effects.push(hidden("payload", joints[last], &values));
+                effects.push(Hidden::new("payload", joints[last], &values));
             }
         }
         effects
@@ -73,33 +73,22 @@ fn friction(joint: Joint, size: f64, speed: f64, rng: &mut impl Rng) -> Hidden {
     let level = size * rng.random_range(SHARES[0]..SHARES[1]);
     let slow = speed * rng.random_range(0.05..0.2);
     match rng.random_range(0..4) {
-        0 => hidden("viscous_friction", joint, &[("b", level / speed)]),
-        1 => hidden("coulomb_friction", joint, &[("F_c", level)]),
+        0 => Hidden::new("viscous_friction", joint, &[("b", level / speed)]),
+        1 => Hidden::new("coulomb_friction", joint, &[("F_c", level)]),
         2 => {
             let more = level * rng.random_range(1.5..2.5);
             let values = [("F_c", level), ("F_s", more), ("v_s", slow)];
-            hidden("stribeck_friction", joint, &values)
+            Hidden::new("stribeck_friction", joint, &values)
         }
         _ => {
             // The drawn level is the friction at the typical speed.
             let rise = level / (speed / slow).asinh();
-            hidden(
+            Hidden::new(
                 "degressive_friction",
                 joint,
                 &[("F_d", rise), ("v_d", slow)],
             )
         }
-    }
-}
-
-fn hidden(name: &str, joint: Joint, values: &[(&str, f64)]) -> Hidden {
-    let own = values
-        .iter()
-        .map(|(name, value)| ((*name).to_owned(), *value));
-    Hidden {
-        name: name.to_owned(),
-        joint,
-        values: own.collect(),
     }
 }
 

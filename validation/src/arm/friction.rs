@@ -1,14 +1,10 @@
 //! The torques that an arm's drivetrains take in addition to the motion of its bodies.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Vector3;
 
 use super::Bodies;
 use crate::hidden::Hidden;
-
-/// Friction law of one joint: torque by velocity.
-type Law = Box<dyn Fn(f64) -> f64 + Sync>;
+use crate::laws::{At, DRY, Law, SMOOTH};
 
 /// A motor that turns with its joint and `ratio` times the next one.
 struct Coupled {
@@ -22,7 +18,9 @@ struct Coupled {
 
 /// The drivetrains of an arm.
 pub(super) struct Friction {
-    laws: Vec<Vec<Law>>,
+    /// Each with the joint that it acts on.
+    smooth: Vec<(usize, Law)>,
+    dry: Vec<(usize, Law)>,
     /// Share of each joint's torque that its gear loses.
     by_load: Vec<f64>,
     coupled: Vec<Coupled>,
@@ -35,7 +33,8 @@ impl Friction {
     /// An effect that no arm of the bench has, or a missing number.
     pub fn of(effects: &[Hidden], joints: usize, bodies: &mut Bodies) -> Result<Self, String> {
         let mut all = Self {
-            laws: (0..joints).map(|_| Vec::new()).collect(),
+            smooth: Vec::new(),
+            dry: Vec::new(),
             by_load: vec![0.0; joints],
             coupled: Vec::new(),
         };
@@ -46,57 +45,50 @@ impl Friction {
     }
 
     fn add(&mut self, effect: &Hidden, bodies: &mut Bodies) -> Result<(), String> {
-        let number = |name: &str| number(&effect.values, name);
+        let mut number = |name: &str| {
+            let found = effect.values.get(name).copied();
+            found.ok_or_else(|| format!("`{}` needs `{name}`", effect.name))
+        };
         let joint = effect.joint.index();
-        let law: Law = match effect.name.as_str() {
-            "viscous_friction" => {
-                let b = number("b")?;
-                Box::new(move |v| b * v)
+        match effect.name.as_str() {
+            name @ ("viscous_friction" | "degressive_friction") => {
+                let law = Law::of(SMOOTH, name, &mut number)?;
+                self.smooth.extend(law.map(|law| (joint, law)));
             }
-            "coulomb_friction" => {
-                let level = number("F_c")?;
-                Box::new(move |v| level * direction(v))
+            name @ ("coulomb_friction" | "stribeck_friction") => {
+                let law = Law::of(DRY, name, &mut number)?;
+                self.dry.extend(law.map(|law| (joint, law)));
             }
-            "stribeck_friction" => {
-                let [slow, fast, bend] = [number("F_s")?, number("F_c")?, number("v_s")?];
-                Box::new(move |v| {
-                    direction(v) * (fast + (slow - fast) * (-(v / bend).powi(2)).exp())
-                })
-            }
-            "degressive_friction" => {
-                let [rise, bend] = [number("F_d")?, number("v_d")?];
-                Box::new(move |v| rise * (v / bend).asinh())
-            }
-            "load_friction" => {
-                self.by_load[joint] = number("k")?;
-                return Ok(());
-            }
-            "joint_coupling" => {
-                self.coupled.push(Coupled {
-                    joint,
-                    ratio: number("r")?,
-                    dry: number("F_c")?,
-                    viscous: number("b")?,
-                    inertia: number("J")?,
-                });
-                return Ok(());
-            }
+            "load_friction" => self.by_load[joint] = number("k")?,
+            "joint_coupling" => self.coupled.push(Coupled {
+                joint,
+                ratio: number("r")?,
+                dry: number("F_c")?,
+                viscous: number("b")?,
+                inertia: number("J")?,
+            }),
             "payload" => {
                 let at = Vector3::new(number("x")?, number("y")?, number("z")?);
                 bodies.load(number("m")?, at);
-                return Ok(());
             }
             name => return Err(format!("`{name}` is not an effect of the bench's arms")),
-        };
-        self.laws[joint].push(law);
+        }
         Ok(())
     }
 
     /// The torques to command for the torques that the bodies need.
     pub fn commanded(&self, needed: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
         let mut torques = needed.to_vec();
-        for (j, torque) in torques.iter_mut().enumerate() {
-            *torque += self.laws[j].iter().map(|law| law(qd[j])).sum::<f64>();
+        let at = |joint: usize| At {
+            v: qd[joint],
+            direction: direction(qd[joint]),
+            ..At::default()
+        };
+        for (joint, law) in &self.smooth {
+            torques[*joint] -= law.at(at(*joint));
+        }
+        for (joint, law) in &self.dry {
+            torques[*joint] += direction(qd[*joint]) * law.at(at(*joint));
         }
         for motor in &self.coupled {
             let sum = |of: &[f64]| of[motor.joint] + motor.ratio * of[motor.joint + 1];
@@ -120,9 +112,4 @@ fn direction(velocity: f64) -> f64 {
     } else {
         velocity.signum()
     }
-}
-
-fn number(values: &BTreeMap<String, f64>, name: &str) -> Result<f64, String> {
-    let found = values.get(name).copied();
-    found.ok_or_else(|| format!("an effect of an arm needs `{name}`"))
 }

@@ -4,12 +4,14 @@ use std::f64::consts::TAU;
 
 use rand::{Rng, RngExt};
 
+use crate::excitation::Multisine;
+
 /// Hz
 const BASE: f64 = 0.1;
 const HARMONICS: usize = 6;
 
-/// Amplitude (rad), angular frequency (rad/s) and phase of each joint's harmonics, and the angle about which they move.
-pub(super) struct Motion(Vec<(f64, Vec<[f64; 3]>)>);
+/// The angle (rad) about which each joint moves, and its harmonics.
+pub(super) struct Motion(Vec<(f64, Multisine)>);
 
 impl Motion {
     pub fn draw(amplitude: &[f64], rng: &mut impl Rng) -> Self {
@@ -20,7 +22,7 @@ impl Motion {
                 let frequency = TAU * BASE * (k + 1) as f64;
                 [largest * share / sum, frequency, rng.random_range(0.0..TAU)]
             };
-            let waves: Vec<[f64; 3]> = shares.into_iter().enumerate().map(wave).collect();
+            let waves = Multisine(shares.into_iter().enumerate().map(wave).collect());
             (rng.random_range(-0.5..0.5) * largest, waves)
         };
         Self(amplitude.iter().map(joint).collect())
@@ -28,16 +30,13 @@ impl Motion {
 
     /// Angles, velocities and accelerations at a time (s).
     pub fn at(&self, time: f64) -> [Vec<f64>; 3] {
-        let sum = |wave: &dyn Fn(&[f64; 3]) -> f64, about: f64| -> Vec<f64> {
-            let joints = self.0.iter();
-            joints
-                .map(|(middle, waves)| about * middle + waves.iter().map(wave).sum::<f64>())
-                .collect()
-        };
+        let joints = || self.0.iter();
         [
-            sum(&|[a, w, p]| a * (w * time + p).sin(), 1.0),
-            sum(&|[a, w, p]| a * w * (w * time + p).cos(), 0.0),
-            sum(&|[a, w, p]| -a * w * w * (w * time + p).sin(), 0.0),
+            joints().map(|(middle, w)| middle + w.at(time)).collect(),
+            joints().map(|(_, waves)| waves.rate(time)).collect(),
+            joints()
+                .map(|(_, waves)| waves.acceleration(time))
+                .collect(),
         ]
     }
 }
