@@ -32,7 +32,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let mut audits = audit_together(&logs, &columns);
     report_repeats(&logs, &mut audits);
     if arguments.common.json {
-        terminal::print(&(serde_json::to_string_pretty(&audits)? + "\n"))?;
+        terminal::json(&audits)?;
     } else {
         for audit in &audits {
             let text = audit.message(&|remedy| format!("paste: {}", remedy::of_finding(remedy)));
@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         }
     }
     let serious = audits.iter().any(|audit| audit.serious().next().is_some());
-    Ok(if serious { Answer::No } else { Answer::Yes })
+    Ok(Answer::of(!serious))
 }
 
 /// `run1.csv: 1 serious, 2 warning(s)`

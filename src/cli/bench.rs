@@ -6,14 +6,16 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
+use indicatif::ProgressBar;
 use serde_json::json;
 
 use super::call::{Begun, files};
 use super::shard::{self, Sharding, program_id};
-use super::{Answer, Common, interrupt, message, progress, terminal};
+use super::work::{self, Store};
+use super::{Answer, Common, message, progress, terminal};
 use residyn_core::model::Library;
 use residyn_io::files::content_id;
-use residyn_io::runs::{Identity, Lines, RunFolder};
+use residyn_io::runs::{Identity, RunFolder};
 use residyn_report::ResultsPage;
 use residyn_validation::{Cell, Line, Source, markdown, read, recorded, summarise};
 
@@ -73,13 +75,12 @@ fn effects(arguments: &Effects) -> Result<Answer> {
     let cells = wanted(arguments)?;
     let folder = RunFolder::open(&arguments.out)?;
     folder.make()?;
-    let store = Store::open(&folder)?;
-    if let Some(part) = arguments.sharding.part(&folder, identity(&cells)?)? {
-        let cells: Vec<Cell> = part.shard().share(cells).collect();
-        store.run(&cells, &folder)?;
+    let part = arguments.sharding.part(&folder, identity(&cells)?)?;
+    let cells: Vec<Cell> = shard::of(part.as_ref()).share(cells).collect();
+    let lines = close_all(&cells, &folder)?;
+    if let Some(part) = part {
         return shard::finish(part, &arguments.common);
     }
-    let lines = store.run(&cells, &folder)?;
     let summary = summarise(&lines);
     let text = markdown(&summary);
     let json = serde_json::to_string_pretty(&summary)? + "\n";
@@ -130,68 +131,37 @@ fn identity(cells: &[Cell]) -> Result<Identity> {
     })
 }
 
-/// Stored results.
-struct Store {
-    file: Lines,
-    /// Hash of this build of the program: another build may give other results.
-    program: String,
-    known: Vec<Line>,
+/// Results of all cells; stored ones are not computed again.
+fn close_all(cells: &[Cell], folder: &RunFolder) -> Result<Vec<Line>> {
+    let program = program_id()?;
+    let key = |line: &Line| line.configuration.clone() + &line.program;
+    let mut store = Store::open(folder, "cells.jsonl", key)?;
+    let library = Library::built_in();
+    let close = |cell: &Cell, bar: &ProgressBar| {
+        bar.set_message(cell.id.clone());
+        let configuration = configuration(cell)?;
+        let key = configuration.clone() + &program;
+        let line = store.or_make(key, || Ok(line(cell, configuration, &program, &library)))?;
+        Ok(line.clone())
+    };
+    terminal::stage("closing the loops", || {
+        work::each(folder, "cells", cells, close)
+    })
 }
 
-impl Store {
-    fn open(folder: &RunFolder) -> Result<Self> {
-        let (file, known) = Lines::open(folder, "cells.jsonl")?;
-        Ok(Self {
-            known,
-            file,
-            program: program_id()?,
-        })
-    }
-
-    /// Results of all cells; stored ones are not computed again.
-    fn run(&self, cells: &[Cell], folder: &RunFolder) -> Result<Vec<Line>> {
-        let begun = Instant::now();
-        let bar = progress::bar(cells.len());
-        let _orderly = interrupt::counted(folder, &bar, "cells");
-        let library = Library::built_in();
-        let mut lines = Vec::with_capacity(cells.len());
-        for cell in cells {
-            bar.set_message(cell.id.clone());
-            lines.push(match self.find(cell)? {
-                Some(line) => line,
-                None => self.add(cell, &library)?,
-            });
-            bar.inc(1);
-        }
-        bar.finish_and_clear();
-        terminal::took("closing the loops", begun);
-        Ok(lines)
-    }
-
-    fn find(&self, cell: &Cell) -> Result<Option<Line>> {
-        let configuration = configuration(cell)?;
-        let same =
-            |line: &&Line| line.configuration == configuration && line.program == self.program;
-        Ok(self.known.iter().find(same).cloned())
-    }
-
-    fn add(&self, cell: &Cell, library: &Library) -> Result<Line> {
-        let begun = Instant::now();
-        let mut settled = cell.clone();
-        let findings = unless_panic(|| {
-            settled = cell.settled(library)?;
-            settled.run(library)
-        });
-        let findings = findings.and_then(|findings| findings.map_err(|error| message(&error)));
-        let line = Line {
-            configuration: configuration(cell)?,
-            program: self.program.clone(),
-            seconds: begun.elapsed().as_secs_f64(),
-            cell: settled,
-            findings,
-        };
-        self.file.add(&line)?;
-        Ok(line)
+fn line(cell: &Cell, configuration: String, program: &str, library: &Library) -> Line {
+    let begun = Instant::now();
+    let mut settled = cell.clone();
+    let findings = unless_panic(|| {
+        settled = cell.settled(library)?;
+        settled.run(library)
+    });
+    Line {
+        configuration,
+        program: program.to_owned(),
+        seconds: begun.elapsed().as_secs_f64(),
+        cell: settled,
+        findings: findings.and_then(|findings| findings.map_err(|error| message(&error))),
     }
 }
 

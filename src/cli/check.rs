@@ -39,7 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             value
         });
         let values: Vec<_> = values.collect();
-        terminal::print(&(serde_json::to_string_pretty(&values)? + "\n"))?;
+        terminal::json(&values)?;
     } else {
         for (path, check) in named() {
             let path = path.display();
@@ -48,5 +48,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         }
     }
     let is_clean = checks.iter().all(|check| check.findings.is_empty());
-    Ok(if is_clean { Answer::Yes } else { Answer::No })
+    Ok(Answer::of(is_clean))
 }

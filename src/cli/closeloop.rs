@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::call::{Begun, files};
@@ -19,6 +18,7 @@ use residyn_core::closeloop::{
 use residyn_core::data::{LeaveOut, Log};
 use residyn_core::model::InputFile;
 use residyn_core::model::{Library, Model, Origin};
+use residyn_core::rng;
 use residyn_io::runs::RunFolder;
 use residyn_io::{plant_from_text, read_model};
 use residyn_report as report;
@@ -96,7 +96,7 @@ const DEMO: &str = include_str!("../../configs/demo.toml");
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let begun = Begun::now();
     let library = arguments.effects.library()?;
-    let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
+    let mut rng = rng(arguments.common.seed);
     let (declared, split) = match &arguments.model {
         Some(model) => {
             terminal::stage("reading the logs", || measured(arguments, model, &library))?
@@ -147,7 +147,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         kept.remove()?;
     }
     if arguments.common.json {
-        terminal::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
+        terminal::json(&report)?;
     } else {
         let curves = match arguments.curves || terminal::shows_curves() {
             true => report::curves(&report),
@@ -263,11 +263,9 @@ fn input_files(arguments: &Arguments) -> Result<Vec<InputFile>> {
 }
 
 fn origin(arguments: &Arguments, declared: &Model) -> Origin {
-    let paths = |paths: &[PathBuf]| {
-        paths
-            .iter()
-            .map(|p| p.display().to_string())
-            .collect::<Vec<_>>()
+    let paths = |paths: &[PathBuf]| -> Vec<String> {
+        let paths = paths.iter();
+        paths.map(|path| path.display().to_string()).collect()
     };
     let spans = arguments
         .leave_out

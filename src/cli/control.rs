@@ -138,22 +138,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     bar.finish_and_clear();
     terminal::took("controlling the plant", begun);
     let printed = Printed::new(arguments, task, entries);
-    if arguments.common.json {
-        terminal::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
-    } else {
-        let Printed {
-            return_mean,
-            successes,
-            ..
-        } = printed;
-        let headline =
-            format!("return {return_mean:.2}; {successes} of {count} episode(s) succeed");
-        terminal::answer(headline, &table(&printed))?;
-    }
-    Ok(match lost_message(&printed.episodes) {
-        true => Answer::No,
-        false => Answer::Yes,
-    })
+    let Printed {
+        return_mean,
+        successes,
+        ..
+    } = printed;
+    let headline = format!("return {return_mean:.2}; {successes} of {count} episode(s) succeed");
+    (arguments.common).answer(|| &printed, headline, &table(&printed))?;
+    Ok(Answer::of(!lost_message(&printed.episodes)))
 }
 
 /// Say in which episode a plan first had no candidate with a finite return; returns whether there is such a plan.

@@ -127,7 +127,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             integrator_step_s: assessment.step_s,
             integrator_error: assessment.step_error,
         };
-        terminal::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
+        terminal::json(&printed)?;
     } else {
         let torque = torque.as_ref().map_or_else(String::new, torques);
         terminal::answer(headline(&summary), &(table(&summary) + &torque))?;

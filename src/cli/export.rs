@@ -3,8 +3,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
@@ -12,6 +10,7 @@ use super::{Answer, Common, terminal};
 use crate::exported_task;
 use residyn_core::limits::SUBSTEPS;
 use residyn_core::model::Library;
+use residyn_core::rng;
 use residyn_core::sim::Integrator;
 use residyn_formats::{
     ClientError, Difference, ExportModel, File, Format, WrittenBack, find, rollout_s, write_back,
@@ -93,7 +92,7 @@ fn write(arguments: &Arguments, format: &'static Format) -> Result<Answer> {
 
 /// What to do if the steps are too long for the friction of a model at rest.
 fn steps_message(model: &ExportModel, arguments: &Arguments) -> Result<Option<String>> {
-    let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
+    let mut rng = rng(arguments.common.seed);
     let needed = model.substeps_around_rest(&mut rng)?;
     if needed <= model.integrator.substeps() {
         return Ok(None);
@@ -147,7 +146,7 @@ fn measure(
     model: &ExportModel,
     arguments: &Arguments,
 ) -> Result<Difference, ClientError> {
-    let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
+    let mut rng = rng(arguments.common.seed);
     let refused = |error: residyn_core::model::NetworkError| ClientError::Failed(error.to_string());
     let samples = model.samples(&mut rng).map_err(refused)?;
     let own = model.predict(&samples).map_err(refused)?;

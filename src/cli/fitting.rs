@@ -52,12 +52,8 @@ pub(super) fn carry_out(job: &Job, dir: &Path, saving: &Saving, common: &Common)
     }
     terminal::stage("training", || run(job, &mut training, &folder, saving))?;
     let results = job.results(&training, dir)?;
-    if common.json {
-        terminal::print(&(serde_json::to_string_pretty(&results)? + "\n"))?;
-    } else {
-        let headline = format!("checkpoint: {}", dir.display());
-        terminal::answer(headline, &results.text())?;
-    }
+    let headline = format!("checkpoint: {}", dir.display());
+    common.answer(|| &results, headline, &results.text())?;
     if results.is_worse() {
         let Change { before, after } = results.error;
         terminal::tell(format!(

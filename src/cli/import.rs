@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 use serde_json::json;
 
-use super::{Answer, Common, inputs, terminal};
+use super::{Answer, Common, inputs};
 use crate::save_imported;
 use residyn_formats::Imported;
 use residyn_io::runs::RunFolder;
@@ -36,12 +36,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let _folder = RunFolder::open(&arguments.out)?;
     save_imported(&arguments.out, imported, seed, device)?;
     let out = arguments.out.display();
-    terminal::print(&match arguments.common.json {
-        true => {
-            let json = json!({"system": system, "written_by": by, "checkpoint": arguments.out});
-            serde_json::to_string_pretty(&json)? + "\n"
-        }
-        false => format!("{out}: checkpoint of a model of {system}, exported by version {by}\n"),
-    })?;
+    let value = || json!({"system": system, "written_by": by, "checkpoint": arguments.out});
+    let line = format!("{out}: checkpoint of a model of {system}, exported by version {by}");
+    (arguments.common).answer(value, &line, &format!("{line}\n"))?;
     Ok(Answer::Yes)
 }

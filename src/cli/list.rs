@@ -70,8 +70,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         What::Tasks => tasks()?,
         What::Formats => formats(),
     };
-    let json = serde_json::to_string_pretty(&value)? + "\n";
-    terminal::print(if arguments.common.json { &json } else { &text })?;
+    match arguments.common.json {
+        true => terminal::json(&value)?,
+        false => terminal::print(&text)?,
+    }
     Ok(Answer::Yes)
 }
 

@@ -65,13 +65,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let rounds = rounds
         .into_inner()
         .expect("nothing panics while it holds the lock");
-    if common.json {
-        let value = json!({"schema": 1, "out": out, "seed": common.seed, "method": method, "rounds": rounds});
-        terminal::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
-    } else {
-        let headline = format!("checkpoint: {}", checkpoint.display());
-        terminal::answer(headline, &table(&rounds, &checkpoint))?;
-    }
+    let value = || json!({"schema": 1, "out": out, "seed": common.seed, "method": method, "rounds": rounds});
+    let headline = format!("checkpoint: {}", checkpoint.display());
+    common.answer(value, headline, &table(&rounds, &checkpoint))?;
     Ok(Answer::Yes)
 }
 

@@ -41,15 +41,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         let missing: Vec<String> = lacking.missing.iter().map(ToString::to_string).collect();
         let unfinished: Vec<_> = lacking.unfinished.iter().map(|(_, path)| path).collect();
         let value = json!({"schema": 1, "out": out, "parts": parts.len(), "missing": missing, "unfinished": unfinished});
-        terminal::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
+        terminal::json(&value)?;
     } else {
         let text = format!("{} parts are merged in {}\n", parts.len(), out.display());
         terminal::answer(out.display(), &text)?;
     }
-    Ok(match lacking == Lacking::default() {
-        true => Answer::Yes,
-        false => Answer::No,
-    })
+    Ok(Answer::of(lacking == Lacking::default()))
 }
 
 fn message(lacking: &Lacking) -> Vec<String> {

@@ -29,12 +29,16 @@ mod sweep;
 mod terminal;
 mod train;
 mod tune;
+mod work;
 
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
+use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
+use serde::Serialize;
 
 pub use self::defect::tell_of_panics;
 use residyn_train::Backend;
@@ -96,6 +100,30 @@ pub(crate) struct Common {
 enum Answer {
     Yes,
     No,
+}
+
+impl Answer {
+    fn of(yes: bool) -> Self {
+        match yes {
+            true => Self::Yes,
+            false => Self::No,
+        }
+    }
+}
+
+impl Common {
+    /// Print a result as JSON if that is asked for, else as text, or only its headline in a quiet run.
+    fn answer<T: Serialize>(
+        &self,
+        value: impl FnOnce() -> T,
+        headline: impl Display,
+        text: &str,
+    ) -> Result<()> {
+        match self.json {
+            true => terminal::json(&value()),
+            false => terminal::answer(headline, text),
+        }
+    }
 }
 
 /// The command line that the program runs on.

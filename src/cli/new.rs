@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     if arguments.common.json {
         let value =
             json!({"model": text, "joints": model.joints, "notes": notes, "out": arguments.out});
-        terminal::print(&format!("{value:#}\n"))?;
+        terminal::json(&value)?;
     } else if let Some(out) = &arguments.out {
         terminal::print(&format!(
             "{}: model of {}, joints: {}\n",

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde_json::json;
 
-use super::{Answer, Common, LIBRARY, terminal};
+use super::{Answer, Common, LIBRARY};
 use residyn_io::files::content_id;
 use residyn_io::runs::{Identity, Part, RunFolder, Shard};
 
@@ -26,18 +26,19 @@ impl Sharding {
     }
 }
 
+/// The shard of a part, or else of a whole run.
+pub(super) fn of(part: Option<&Part>) -> Shard {
+    part.map_or(Shard::WHOLE, Part::shard)
+}
+
 /// Say that all work of a part is done.
 pub(super) fn finish(part: Part, common: &Common) -> Result<Answer> {
     let (shard, folder) = (part.shard(), part.folder().clone());
     part.finish()?;
     let out = folder.path();
-    if common.json {
-        let value = json!({"schema": 1, "shard": shard.to_string(), "out": out});
-        terminal::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
-    } else {
-        let text = format!("shard {shard} is done: {}\n", out.display());
-        terminal::answer(out.display(), &text)?;
-    }
+    let value = || json!({"schema": 1, "shard": shard.to_string(), "out": out});
+    let text = format!("shard {shard} is done: {}\n", out.display());
+    common.answer(value, out.display(), &text)?;
     Ok(Answer::Yes)
 }
 

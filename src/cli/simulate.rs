@@ -3,14 +3,13 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
 use super::{Answer, Common, inputs, terminal};
 use residyn_core::data::Joint;
 use residyn_core::model::Library;
 use residyn_core::plant::Plant;
+use residyn_core::rng;
 use residyn_io::files::check_room;
 use residyn_io::{read_plant, write_log};
 
@@ -86,7 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         plant = lasting.with_context(|| format!("--duration {duration:?}"))?;
     }
     check_room(&arguments.out)?;
-    let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
+    let mut rng = rng(arguments.common.seed);
     let log = terminal::stage("simulating", || plant.record(&mut rng))?;
     write_log(&log, &arguments.out).context("the log was not written")?;
     let effects: Vec<&str> = plant
@@ -94,17 +93,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         .iter()
         .map(|e| e.effect.name.as_str())
         .collect();
-    if arguments.common.json {
-        let value = json!({"out": arguments.out, "rows": log.rows(), "duration_s": log.duration(), "effects": effects});
-        terminal::print(&format!("{value:#}\n"))?;
-    } else {
-        terminal::print(&format!(
-            "{}: {} rows, {} s\n",
-            arguments.out.display(),
-            log.rows(),
-            log.duration()
-        ))?;
-    }
+    let value = || json!({"out": arguments.out, "rows": log.rows(), "duration_s": log.duration(), "effects": effects});
+    let (out, rows, duration_s) = (arguments.out.display(), log.rows(), log.duration());
+    let line = format!("{out}: {rows} rows, {duration_s} s");
+    (arguments.common).answer(value, &line, &format!("{line}\n"))?;
     Ok(Answer::Yes)
 }
 

@@ -1,5 +1,3 @@
-mod store;
-
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -7,13 +5,15 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use self::store::{Store, Stored};
-use super::shard::{self, Sharding};
+use super::shard::{self, Sharding, program_id};
+use super::work::Store;
 use super::{Answer, Common, command_line, inputs, interrupt, progress, terminal};
+use residyn_io::files::content_id;
 use residyn_io::runs::{Identity, RunFolder};
+use residyn_train::Trained;
 use residyn_train::recipe::{Job, Member, Recipe, SweepResults};
 
 /// Train many models with one recipe, with different initial weights or different weights of the penalty
@@ -46,6 +46,16 @@ pub(super) struct Arguments {
     sharding: Sharding,
     #[command(flatten)]
     common: Common,
+}
+
+/// A model; one line of `models.jsonl`.
+#[derive(Clone, Serialize, Deserialize)]
+struct Stored {
+    /// Identifies the model, what it was trained by, and this build of the program: another one may give other results.
+    configuration: String,
+    /// Time that its training took, s.
+    seconds: f64,
+    trained: Trained,
 }
 
 /// A range of weights, both above zero and finite.
@@ -105,32 +115,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     }
     let members = arguments.members();
     job.check_members(&members)?;
-    let mut store = Store::open(&folder, &job)?;
-    if let Some(part) = arguments.sharding.part(&folder, arguments.identity(&job))? {
-        let members: Vec<Member> = part.shard().share(members).collect();
-        train(&job, &members, &mut store, arguments)?;
+    let run = json!([job.identity(), program_id()?]).to_string();
+    let run = content_id(run.as_bytes());
+    let key = |member: &Member| content_id(json!([run, member]).to_string().as_bytes());
+    let part = arguments.sharding.part(&folder, arguments.identity(&job))?;
+    let members: Vec<Member> = shard::of(part.as_ref()).share(members).collect();
+    let models = train(&job, &members, &folder, &key)?;
+    if let Some(part) = part {
         return shard::finish(part, common);
     }
-    train(&job, &members, &mut store, arguments)?;
-    let models: Vec<&Stored> = members
-        .iter()
-        .filter_map(|member| store.find(member))
-        .collect();
     let wall_s = models.iter().map(|model| model.seconds).sum();
-    let trained = models
-        .into_iter()
-        .map(|model| model.trained.clone())
-        .collect();
+    let trained = models.into_iter().map(|model| model.trained).collect();
     let swept = SweepResults::new(&job, &members, trained, wall_s);
     let json = serde_json::to_string_pretty(&swept)? + "\n";
     folder.write_text("sweep.json", &json)?;
     terminal::print(&if common.json { json } else { swept.text() })?;
     let all_diverged = swept.totals.diverged == swept.totals.models;
-    Ok(if all_diverged {
-        Answer::No
-    } else {
-        Answer::Yes
-    })
+    Ok(Answer::of(!all_diverged))
 }
 
 impl Arguments {
@@ -164,30 +165,44 @@ impl Arguments {
     }
 }
 
-/// Train the models that are not stored yet, and store them.
-fn train(job: &Job, members: &[Member], store: &mut Store, arguments: &Arguments) -> Result<()> {
-    let is_new = |member: &&Member| store.find(member).is_none();
-    let new: Vec<Member> = members.iter().filter(is_new).copied().collect();
-    let bar = progress::bar(new.len() * job.recipe.fit.epochs);
-    let out = arguments.out.display().to_string();
-    let _orderly = interrupt::orderly(store.folder(), move || {
-        format!(
-            "{out} keeps the models that are done; {}",
-            interrupt::go_on()
-        )
+/// The trained models; those that are not stored yet are trained now, and stored by their `key`.
+fn train(
+    job: &Job,
+    members: &[Member],
+    folder: &RunFolder,
+    key: &dyn Fn(&Member) -> String,
+) -> Result<Vec<Stored>> {
+    let stored_key = |stored: &Stored| stored.configuration.clone();
+    let mut store = Store::open(folder, "models.jsonl", stored_key)?;
+    let is_new = |member: &&Member| store.find(&key(member)).is_none();
+    let new = members.iter().filter(is_new).count();
+    let bar = progress::bar(new * job.recipe.fit.epochs);
+    let out = folder.path().display().to_string();
+    let _orderly = interrupt::orderly(folder, move || {
+        let go_on = interrupt::go_on();
+        format!("{out} keeps the models that are done; {go_on}")
     });
     let begun = Instant::now();
     let mut diverged = 0;
-    for member in &new {
-        let since = Instant::now();
-        let trained = job.train_member(member, &mut || bar.inc(1))?;
-        diverged += usize::from(trained.diverged);
-        bar.set_message(format!("epochs, {diverged} diverged"));
-        store.add(member, trained, since.elapsed().as_secs_f64())?;
-    }
+    let model = |member: &Member| {
+        let configuration = key(member);
+        let stored = store.or_make(configuration.clone(), || {
+            let since = Instant::now();
+            let trained = job.train_member(member, &mut || bar.inc(1))?;
+            diverged += usize::from(trained.diverged);
+            bar.set_message(format!("epochs, {diverged} diverged"));
+            Ok(Stored {
+                configuration,
+                seconds: since.elapsed().as_secs_f64(),
+                trained,
+            })
+        })?;
+        Ok(stored.clone())
+    };
+    let models = members.iter().map(model).collect();
     bar.finish_and_clear();
     terminal::took("training", begun);
-    Ok(())
+    models
 }
 
 #[cfg(test)]

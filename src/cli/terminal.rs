@@ -9,6 +9,7 @@ use std::time::Instant;
 use anstyle::{AnsiColor, Style};
 use anyhow::{Context, Result};
 use clap::Args;
+use serde::Serialize;
 
 /// How much is said.
 #[derive(Debug, Clone, Copy, Default, Args)]
@@ -63,6 +64,11 @@ pub(super) fn print(text: &str) -> Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Print a value as JSON on standard output.
+pub(super) fn json(value: &impl Serialize) -> Result<()> {
+    print(&(serde_json::to_string_pretty(value)? + "\n"))
 }
 
 /// Whether standard output is a terminal that shows UTF-8, according to its locale.

@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 use serde_json::json;
 
 use super::shard::{self, Sharding, program_id};
-use super::{Answer, Common, interrupt, message, progress, terminal, unless_panic};
+use super::{Answer, Common, message, progress, terminal, unless_panic, work};
 use crate::cli::call::{Begun, files};
 use residyn_core::model::Library;
 use residyn_formats::ClientError;
@@ -97,19 +97,16 @@ pub(super) fn run(arguments: &Rigs) -> Result<Answer> {
             seed: arguments.common.seed,
         },
     };
-    let work = work(arguments, &rigs)?;
-    if let Some(part) = arguments
-        .sharding
-        .part(&store.folder, store.identity(&work))?
-    {
-        let work: Vec<Work<'_>> = part.shard().share(work).collect();
-        let (_, not_run) = store.run(&work)?;
+    let work = wanted(arguments, &rigs)?;
+    let part = (arguments.sharding).part(&store.folder, store.identity(&work))?;
+    let work: Vec<Work<'_>> = shard::of(part.as_ref()).share(work).collect();
+    let (lines, not_run) = store.run(&work)?;
+    if let Some(part) = part {
         for (method, reason) in not_run {
             terminal::say(format!("note: {} was not run: {reason}", method.name()));
         }
         return shard::finish(part, &arguments.common);
     }
-    let (lines, not_run) = store.run(&work)?;
     let summary = summarise(&rigs, &lines, not_run);
     let text = markdown(&summary);
     store.folder.write("rigs.json", &summary)?;
@@ -129,11 +126,7 @@ pub(super) fn run(arguments: &Rigs) -> Result<Answer> {
     page.write(&store.folder)?;
     let json = || Ok::<_, anyhow::Error>(serde_json::to_string_pretty(&summary)? + "\n");
     terminal::print(&if arguments.common.json { json()? } else { text })?;
-    Ok(if summary.failures.is_empty() {
-        Answer::Yes
-    } else {
-        Answer::No
-    })
+    Ok(Answer::of(summary.failures.is_empty()))
 }
 
 fn open(arguments: &Rigs, library: &Library) -> Result<Vec<Measured>> {
@@ -157,13 +150,13 @@ struct Work<'a> {
     method: Method,
 }
 
-fn work<'a>(arguments: &Rigs, rigs: &'a [Measured]) -> Result<Vec<Work<'a>>> {
+fn wanted<'a>(arguments: &Rigs, rigs: &'a [Measured]) -> Result<Vec<Work<'a>>> {
     let folds = rigs
         .iter()
         .flat_map(|rig| rig.folds.iter().map(move |fold| (rig, fold)));
     let all = folds.flat_map(|(rig, fold)| Method::ALL.map(|method| Work { rig, fold, method }));
-    let wanted = |work: &Work<'_>| arguments.wants(&work.rig.rig.name, Some(&work.name()));
-    let work: Vec<Work<'_>> = all.filter(wanted).collect();
+    let is_wanted = |work: &Work<'_>| arguments.wants(&work.rig.rig.name, Some(&work.name()));
+    let work: Vec<Work<'_>> = all.filter(is_wanted).collect();
     if work.is_empty() {
         bail!("no result's name contains what --only asks for");
     }
@@ -206,17 +199,14 @@ impl Store<'_> {
 
     /// The results, and which methods cannot be run here; stored results are not computed again.
     fn run(&self, all: &[Work<'_>]) -> Result<(Vec<Line>, BTreeMap<Method, String>)> {
-        let bar = progress::bar(all.len());
-        let _orderly = interrupt::counted(&self.folder, &bar, "results");
+        let line = |work: &Work<'_>, bar: &ProgressBar| Ok((work.method, self.line(work, bar)?));
         let (mut lines, mut not_run) = (Vec::with_capacity(all.len()), BTreeMap::new());
-        for work in all {
-            match self.line(work, &bar)? {
+        for (method, line) in work::each(&self.folder, "results", all, line)? {
+            match line {
                 Ok(line) => lines.push(line),
-                Err(reason) => _ = not_run.insert(work.method, reason),
+                Err(reason) => _ = not_run.insert(method, reason),
             }
-            bar.inc(1);
         }
-        bar.finish_and_clear();
         Ok((lines, not_run))
     }
 

@@ -1,23 +1,22 @@
 //! `--calibrate`: the findings of each simulation are saved, so that an interrupted calibration can go on.
 
-use std::collections::BTreeMap;
-use std::time::Instant;
-
 use anyhow::Result;
+use indicatif::ProgressBar;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::cli::shard::program_id;
-use crate::cli::{interrupt, progress, terminal};
+use crate::cli::work::{self, Store};
+use crate::cli::{progress, terminal};
 use residyn_core::closeloop::{Calibration, Calibrator, Searched, Simulation};
 use residyn_core::model::InputFile;
 use residyn_core::model::{Model, Origin};
 use residyn_io::files::content_id;
-use residyn_io::runs::{Lines, RunFolder};
+use residyn_io::runs::RunFolder;
 
 /// A simulation that was searched; one line of `simulations.jsonl`.
 #[derive(Serialize, Deserialize)]
-struct Stored {
+pub struct Stored {
     /// Identifies the simulation and what it was made from.
     configuration: String,
     searched: Option<Searched>,
@@ -38,18 +37,13 @@ pub fn carry_out(
     calibrator: Calibrator<'_>,
     folder: &RunFolder,
     run: &str,
-) -> Result<(Calibration, Lines)> {
-    let (file, stored) = Lines::open::<Stored>(folder, "simulations.jsonl")?;
-    let stored = stored.into_iter();
-    let known: BTreeMap<String, Option<Searched>> = stored
-        .map(|stored| (stored.configuration, stored.searched))
-        .collect();
+) -> Result<(Calibration, Store<Stored>)> {
+    let key = |stored: &Stored| stored.configuration.clone();
+    let mut store = Store::open(folder, "simulations.jsonl", key)?;
     let configuration =
         |simulation: &Simulation| content_id(json!([run, simulation.key()]).to_string().as_bytes());
     let all = calibrator.simulations();
-    let bar = progress::bar(all.len());
-    let _orderly = interrupt::counted(folder, &bar, "simulations");
-    let is_known = |simulation: &&Simulation| known.contains_key(&configuration(simulation));
+    let is_known = |simulation: &&Simulation| store.find(&configuration(simulation)).is_some();
     match all.iter().filter(is_known).count() {
         0 => {}
         kept => terminal::say(format!(
@@ -58,29 +52,20 @@ pub fn carry_out(
             all.len()
         )),
     }
-    let begun = Instant::now();
-    let mut results = Vec::with_capacity(all.len());
-    for simulation in all {
+    let search = |simulation: &Simulation, bar: &ProgressBar| {
         let configuration = configuration(simulation);
-        results.push(match known.get(&configuration) {
-            Some(searched) => searched.clone(),
-            None => {
-                let watch = progress::Step {
-                    bar: &bar,
-                    what: simulation.about(),
-                };
-                let searched = calibrator.search(simulation, &watch)?;
-                let stored = Stored {
-                    configuration,
-                    searched,
-                };
-                file.add(&stored)?;
-                stored.searched
-            }
-        });
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
-    terminal::took("simulating the accepted model", begun);
-    Ok((calibrator.conclude(results), file))
+        let stored = store.or_make(configuration.clone(), || {
+            let what = simulation.about();
+            let watch = progress::Step { bar, what };
+            Ok(Stored {
+                configuration,
+                searched: calibrator.search(simulation, &watch)?,
+            })
+        })?;
+        Ok(stored.searched.clone())
+    };
+    let results = terminal::stage("simulating the accepted model", || {
+        work::each(folder, "simulations", all, search)
+    })?;
+    Ok((calibrator.conclude(results), store))
 }
