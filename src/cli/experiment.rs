@@ -2,7 +2,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Result;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use indicatif::ProgressBar;
 use serde_json::Value;
 
 use super::call::{Begun, files};
@@ -10,8 +12,10 @@ use super::shard::{self, Sharding};
 use super::{Answer, Common, command_line, inputs, interrupt, progress, terminal};
 use residyn_core::model::Library;
 use residyn_experiments::experiment::undeclared_effect::{self, Trial};
-use residyn_experiments::experiment::{Config, Experiment, FinishedRound, Session, picture};
-use residyn_io::runs::{Part, RunFolder, Shard};
+use residyn_experiments::experiment::{
+    Config, EXPERIMENTS, Experiment, ExperimentError, FinishedRound, Session, picture,
+};
+use residyn_io::runs::{Identity, Part, RunFolder, Shard};
 use residyn_plot::Share;
 use residyn_report::ResultsPage;
 
@@ -24,8 +28,8 @@ use residyn_report::ResultsPage;
     after_help = "Example:\n  residyn experiment physics-prior --config configs/physics-prior/pendulum.toml --out physics-prior"
 )]
 pub(super) struct Arguments {
-    #[arg(value_enum)]
-    name: Name,
+    #[arg(value_parser = names())]
+    name: String,
     /// The experiment's configuration
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
@@ -40,12 +44,11 @@ pub(super) struct Arguments {
     common: Common,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Name {
-    PhysicsPrior,
-    OfflinePrior,
-    RecedingHorizon,
-    UndeclaredEffect,
+const UNDECLARED_EFFECT: &str = "undeclared-effect";
+
+fn names() -> PossibleValuesParser {
+    let published = EXPERIMENTS.iter().map(|experiment| experiment.name);
+    PossibleValuesParser::new(published.chain([UNDECLARED_EFFECT]))
 }
 
 /// The file with the time so far, s: not a result, and therefore not merged from parts.
@@ -81,12 +84,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let folder = RunFolder::open(&arguments.out)?;
     let clock = Clock::open(&folder)?;
     let library = arguments.effects.library()?;
-    let published = |experiment| published(arguments, experiment, &library, &clock);
-    let done = match arguments.name {
-        Name::PhysicsPrior => published(Experiment::PhysicsPrior),
-        Name::OfflinePrior => published(Experiment::OfflinePrior),
-        Name::RecedingHorizon => published(Experiment::RecedingHorizon),
-        Name::UndeclaredEffect => undeclared_effect(arguments, library, &clock),
+    let mut published = EXPERIMENTS.iter();
+    let done = match published.find(|known| known.name == arguments.name) {
+        Some(experiment) => carry_out_published(arguments, experiment, &library, &clock),
+        None => undeclared_effect(arguments, library, &clock),
     }?;
     clock.save();
     let finished = match done {
@@ -124,35 +125,63 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     Ok(finished.answer)
 }
 
-fn published(
+/// What is to be done in steps, which are counted for a shard and called `what`, in a stage of this name.
+struct Work<'w> {
+    run: Identity,
+    steps: &'w dyn Fn(Shard) -> usize,
+    what: &'static str,
+    stage: &'static str,
+}
+
+impl Work<'_> {
+    /// Do the part that is asked for; `None` is the whole run.
+    fn carry_out<R>(
+        self,
+        arguments: &Arguments,
+        folder: &RunFolder,
+        body: impl FnOnce(Shard, &ProgressBar) -> Result<R, ExperimentError>,
+    ) -> Result<(Option<Part>, R)> {
+        let part = arguments.sharding.part(folder, self.run)?;
+        let shard = shard::of(part.as_ref());
+        let begun = Instant::now();
+        let bar = progress::bar((self.steps)(shard));
+        let _orderly = interrupt::counted(folder, &bar, self.what);
+        let done = body(shard, &bar);
+        bar.finish_and_clear();
+        terminal::took(self.stage, begun);
+        Ok((part, done?))
+    }
+}
+
+fn carry_out_published(
     arguments: &Arguments,
-    experiment: Experiment,
+    experiment: &Experiment,
     library: &Library,
     clock: &Clock<'_>,
 ) -> Result<Done> {
     let Common { device, seed, .. } = arguments.common;
     let config = Config::read(&arguments.config)?;
     let session = Session::open(config, library, device, seed)?;
-    let run = session.run_of_experiment(experiment);
-    let part = arguments.sharding.part(clock.folder, run)?;
-    let begun = Instant::now();
-    let bar = progress::bar(session.rounds(shard_of(&part)));
-    let _orderly = interrupt::counted(clock.folder, &bar, "rounds");
-    let observer = |step: &FinishedRound<'_>| {
-        bar.inc(1);
-        bar.set_message(message(step));
-        if !step.found {
-            clock.save();
-        }
+    let work = Work {
+        run: session.run_of_experiment(experiment),
+        steps: &|shard| session.rounds(shard),
+        what: "rounds",
+        stage: "learning and judging",
     };
+    let (part, results) = work.carry_out(arguments, clock.folder, |shard, bar| {
+        let observer = |step: &FinishedRound<'_>| {
+            bar.inc(1);
+            bar.set_message(message(step));
+            if !step.found {
+                clock.save();
+            }
+        };
+        session.carry_out(experiment, shard, clock.folder, &observer)
+    })?;
     if let Some(part) = part {
-        session.carry_out_shard(experiment, part.shard(), clock.folder, &observer)?;
         return Ok(Done::Part(part));
     }
-    let results = session.carry_out(experiment, clock.folder, &observer);
-    bar.finish_and_clear();
-    terminal::took("learning and judging", begun);
-    let results = results?.finished(command_line(), clock.wall_s());
+    let results = results.finished(command_line(), clock.wall_s());
     Ok(Done::Whole(Finished {
         what: format!("{}, {}", results.experiment, results.task),
         headline: results.headline(),
@@ -165,51 +194,41 @@ fn published(
     }))
 }
 
-/// The part of a run to do.
-fn shard_of(part: &Option<Part>) -> Shard {
-    part.as_ref().map_or(Shard::WHOLE, Part::shard)
-}
-
 fn undeclared_effect(arguments: &Arguments, library: Library, clock: &Clock<'_>) -> Result<Done> {
     let Common { device, seed, .. } = arguments.common;
     let experiment = undeclared_effect::Experiment::read(&arguments.config)?;
     let session = undeclared_effect::Session::new(experiment, library, device, seed)?;
-    let part = arguments
-        .sharding
-        .part(clock.folder, session.run_of_all())?;
-    let begun = Instant::now();
-    let bar = progress::bar(shard_of(&part).share(session.trials()).count());
-    let _orderly = interrupt::counted(clock.folder, &bar, "trials");
-    let observer = |trial: &Trial| {
-        bar.inc(1);
-        bar.set_message(format!("episodes; {} seed {}", trial.case, trial.seed));
-        clock.save();
+    let work = Work {
+        run: session.run_of_all(),
+        steps: &|shard| shard.share(session.trials()).count(),
+        what: "trials",
+        stage: "trials",
     };
+    let (part, trials) = work.carry_out(arguments, clock.folder, |shard, bar| {
+        let observer = |trial: &Trial| {
+            bar.inc(1);
+            bar.set_message(format!("episodes; {} seed {}", trial.case, trial.seed));
+            clock.save();
+        };
+        session.run_shard(shard, clock.folder, &observer)
+    })?;
     if let Some(part) = part {
-        session.run_shard(part.shard(), clock.folder, &observer)?;
         return Ok(Done::Part(part));
     }
-    let outcome = session.run(clock.folder, &observer);
-    bar.finish_and_clear();
-    terminal::took("trials", begun);
-    let outcome = outcome?;
+    let outcome = session.results(&trials);
     let mut value = serde_json::to_value(&outcome)?;
-    value["experiment"] = "undeclared-effect".into();
+    value["experiment"] = UNDECLARED_EFFECT.into();
     value["command"] = command_line().into();
     value["wall_s"] = clock.wall_s().into();
     Ok(Done::Whole(Finished {
-        what: format!("undeclared-effect, {}", session.task.name()),
+        what: format!("{UNDECLARED_EFFECT}, {}", session.task.name()),
         headline: outcome.headline(),
         text: outcome.text(),
         shares: outcome.shares(),
         figure: None,
         json: serde_json::to_string_pretty(&value)? + "\n",
         config: value["config"].take(),
-        answer: if outcome.reached {
-            Answer::Yes
-        } else {
-            Answer::No
-        },
+        answer: Answer::of(outcome.reached),
     }))
 }
 

@@ -18,6 +18,6 @@ pub use config::{Config, MethodConfig};
 pub use error::ExperimentError;
 pub use learning::{FinishedRound, Observer};
 pub use picture::picture;
-pub use published::Experiment;
+pub use published::{EXPERIMENTS, Experiment};
 pub use results::{Course, PERFECT, PRIOR, Reached, Results};
 pub use session::Session;

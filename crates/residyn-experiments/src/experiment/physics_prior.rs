@@ -1,15 +1,16 @@
 //! Experiment 1: the prior is the declared physics, without the friction of the plant.
 
-use super::Session;
+use super::{Experiment, Session};
 use crate::mbrl::Prior;
 
-pub(super) const NAME: &str = "physics-prior";
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    name: "physics-prior",
+    check,
+    horizons: |_| None,
+};
 
-pub(super) fn check(session: &Session) -> Result<(), String> {
-    if session.has_prior(|prior| matches!(prior, Prior::Equations(_))) {
-        return Ok(());
-    }
-    Err(format!(
-        "{NAME} needs a method whose prior is equations; give it a `model`"
-    ))
+fn check(session: &Session) -> Result<(), String> {
+    let has_it = session.has_prior(|prior| matches!(prior, Prior::Equations(_)));
+    let lacks = "physics-prior needs a method whose prior is equations; give it a `model`";
+    has_it.then_some(()).ok_or(lacks.to_owned())
 }

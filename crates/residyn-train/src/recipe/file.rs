@@ -1,4 +1,5 @@
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -88,12 +89,7 @@ impl Recipe {
     /// # Errors
     /// As [`Recipe::read`].
     pub fn from_text(path: &Path, text: &str) -> Result<Self, RecipeError> {
-        let wrong = |message: String| RecipeError::File {
-            path: path.to_owned(),
-            message,
-        };
-        let recipe: Self = from_toml(text).map_err(|e| wrong(e.to_string()))?;
-        recipe.located(path)
+        Self::located(path, from_toml(text))
     }
 
     /// The recipe in `json`, with the keys of a recipe file; file names in it are relative to the working directory.
@@ -101,20 +97,19 @@ impl Recipe {
     /// # Errors
     /// As [`Recipe::read`], without lines.
     pub fn from_json(json: &str) -> Result<Self, RecipeError> {
-        let path = Path::new("recipe");
+        Self::located(Path::new("recipe"), serde_json::from_str(json))
+    }
+
+    /// The recipe, if it was read, located at this file and checked.
+    fn located(path: &Path, read: Result<Self, impl Display>) -> Result<Self, RecipeError> {
         let wrong = |message: String| RecipeError::File {
             path: path.to_owned(),
             message,
         };
-        let recipe: Self = serde_json::from_str(json).map_err(|e| wrong(e.to_string()))?;
-        recipe.located(path)
-    }
-
-    /// The recipe, located at this file and checked.
-    fn located(mut self, path: &Path) -> Result<Self, RecipeError> {
-        path.clone_into(&mut self.path);
-        self.check().map_err(|message| self.wrong(message))?;
-        Ok(self)
+        let mut recipe = read.map_err(|error| wrong(error.to_string()))?;
+        path.clone_into(&mut recipe.path);
+        recipe.check().map_err(wrong)?;
+        Ok(recipe)
     }
 
     /// The recipe for fine-tuning a model of `system` on logs: segments and integrator suit finely and irregularly

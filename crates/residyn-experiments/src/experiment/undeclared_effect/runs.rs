@@ -24,7 +24,12 @@ impl Session {
         observer: &(impl Fn(&Trial) + Sync),
     ) -> Result<Results, ExperimentError> {
         let trials = self.run_shard(Shard::WHOLE, folder, observer)?;
-        Ok(Results::new(&self.experiment, &trials))
+        Ok(self.results(&trials))
+    }
+
+    /// The results of all trials.
+    pub fn results(&self, trials: &[Trial]) -> Results {
+        Results::new(&self.experiment, trials)
     }
 
     /// As [`Session::run`], for a shard of the trials.
