@@ -1,14 +1,14 @@
 //! A file of measured rigs: their logs, declared models and published parameter sets.
 
 use std::collections::BTreeMap;
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 use toml::Spanned;
 
-use residyn_core::data::{LeaveOut, LeaveOutError, LogError};
-use residyn_core::model::FileError;
+use residyn_core::data::LeaveOut;
 use residyn_core::toml_text::from_toml;
 use residyn_io::files::{beside_or_named, read_text};
 
@@ -28,14 +28,22 @@ pub enum RigsError {
     },
     #[error("{rig}: there is no folder {folder}", folder = .folder.display())]
     NoLogs { rig: String, folder: PathBuf },
+    /// A model, a log or a name that does not fit the rig.
     #[error("{rig}: {source}")]
-    Model { rig: String, source: FileError },
-    #[error("{rig}: {source}")]
-    Log { rig: String, source: LogError },
-    #[error("{rig}: {source}")]
-    LeaveOut { rig: String, source: LeaveOutError },
-    #[error("{rig}: {message}")]
-    Parameters { rig: String, message: String },
+    Rig {
+        rig: String,
+        source: Box<dyn Error + Send + Sync>,
+    },
+}
+
+impl RigsError {
+    /// What is wrong with this rig.
+    pub(super) fn of<E: Into<Box<dyn Error + Send + Sync>>>(rig: &Rig) -> impl Fn(E) -> Self {
+        |source| Self::Rig {
+            rig: rig.name.clone(),
+            source: source.into(),
+        }
+    }
 }
 
 /// Which logs of a rig train a model and which test it.

@@ -50,11 +50,6 @@ impl Measured {
     /// # Errors
     /// A model or log that cannot be read, or names that the models do not have.
     pub fn open(rig: Rig, data: &Path, library: &Library) -> Result<Self, RigsError> {
-        let name = || rig.name.clone();
-        let wrong = |message| RigsError::Parameters {
-            rig: name(),
-            message,
-        };
         let declared = model(&rig, &rig.declared, library)?;
         let published = |set: &Published| Ok((set.name.clone(), model(&rig, &set.model, library)?));
         let logs = Logs::read(&rig, &declared, data)?;
@@ -64,8 +59,7 @@ impl Measured {
             .map(published)
             .collect::<Result<_, _>>()?;
         Ok(Self {
-            plain: with_plain(&declared, &rig.plain, library)
-                .map_err(|error| wrong(error.to_string()))?,
+            plain: with_plain(&declared, &rig.plain, library).map_err(RigsError::of(&rig))?,
             published,
             folds: logs.folds(rig.test),
             fingerprint: fingerprint(&rig, data),
@@ -77,24 +71,13 @@ impl Measured {
 
 /// A model with other values of some of its parameters.
 fn model(rig: &Rig, declared: &Declared, library: &Library) -> Result<Model, RigsError> {
-    let name = || rig.name.clone();
-    let read = read_model(&declared.model, library);
-    let mut model = read.map_err(|source| RigsError::Model {
-        rig: name(),
-        source,
-    })?;
+    let mut model = read_model(&declared.model, library).map_err(RigsError::of(rig))?;
     for (parameter, value) in &declared.parameters {
         let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
         let Some(k) = known.iter().position(|known| known == parameter) else {
-            let message = format!(
-                "{} has no parameter `{parameter}`; it has {}",
-                declared.model.display(),
-                known.join(", ")
-            );
-            return Err(RigsError::Parameters {
-                rig: name(),
-                message,
-            });
+            let (file, known) = (declared.model.display(), known.join(", "));
+            let message = format!("{file} has no parameter `{parameter}`; it has {known}");
+            return Err(RigsError::of(rig)(message));
         };
         model.parameters[k] = model.parameters[k].with_value(*value);
     }
@@ -128,28 +111,18 @@ struct Logs {
 
 impl Logs {
     fn read(rig: &Rig, model: &Model, data: &Path) -> Result<Self, RigsError> {
-        let name = || rig.name.clone();
         let folder = data.join(&rig.folder);
         if !folder.is_dir() {
-            return Err(RigsError::NoLogs {
-                rig: name(),
-                folder,
-            });
+            let rig = rig.name.clone();
+            return Err(RigsError::NoLogs { rig, folder });
         }
         let groups = std::iter::once(&rig.logs).chain(rig.also.values());
         let paths = groups.clone().flatten().map(|log| folder.join(log));
-        let read = read_logs(paths, model);
-        let mut logs = read.map_err(|source| RigsError::Log {
-            rig: name(),
-            source,
-        })?;
-        let left = |source| RigsError::LeaveOut {
-            rig: name(),
-            source,
-        };
+        let mut logs = read_logs(paths, model).map_err(RigsError::of(rig))?;
         let spans = rig.leave_out.iter().map(|text| text.parse::<LeaveOut>());
-        let spans = spans.collect::<Result<Vec<_>, _>>().map_err(left)?;
-        leave_out::apply(&mut logs, &spans).map_err(left)?;
+        let spans = spans.collect::<Result<Vec<_>, _>>();
+        let spans = spans.map_err(RigsError::of(rig))?;
+        leave_out::apply(&mut logs, &spans).map_err(RigsError::of(rig))?;
         let mut groups = groups.map(|group| logs.drain(..group.len()).collect());
         Ok(Self {
             fitted: groups.next().unwrap_or_default(),
