@@ -15,7 +15,7 @@ use residyn_experiments::experiment::undeclared_effect::{self, Trial};
 use residyn_experiments::experiment::{
     Config, EXPERIMENTS, Experiment, ExperimentError, FinishedRound, Session, picture,
 };
-use residyn_io::runs::{Identity, Part, RunFolder, Shard};
+use residyn_io::runs::{Identity, RunFolder, Shard};
 use residyn_plot::Share;
 use residyn_report::ResultsPage;
 
@@ -54,12 +54,6 @@ fn names() -> PossibleValuesParser {
 /// The file with the time so far, s: not a result, and therefore not merged from parts.
 const WALL: &str = ".wall_s";
 
-/// What was done.
-enum Done {
-    Part(Part),
-    Whole(Finished),
-}
-
 /// Its files.
 const RESULTS: &str = "results.json";
 const FIGURE: &str = "results.svg";
@@ -85,14 +79,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let clock = Clock::open(&folder)?;
     let library = arguments.effects.library()?;
     let mut published = EXPERIMENTS.iter();
-    let done = match published.find(|known| known.name == arguments.name) {
+    let finished = match published.find(|known| known.name == arguments.name) {
         Some(experiment) => carry_out_published(arguments, experiment, &library, &clock),
         None => undeclared_effect(arguments, library, &clock),
     }?;
-    clock.save();
-    let finished = match done {
-        Done::Part(part) => return shard::finish(part, &arguments.common),
-        Done::Whole(finished) => finished,
+    let Some(finished) = finished else {
+        return Ok(Answer::Yes);
     };
     let page = ResultsPage {
         what: &finished.what,
@@ -134,22 +126,27 @@ struct Work<'w> {
 }
 
 impl Work<'_> {
-    /// Do the part that is asked for; `None` is the whole run.
+    /// Do the part that is asked for; the results are those of the whole run, or none.
     fn carry_out<R>(
         self,
         arguments: &Arguments,
-        folder: &RunFolder,
+        clock: &Clock<'_>,
         body: impl FnOnce(Shard, &ProgressBar) -> Result<R, ExperimentError>,
-    ) -> Result<(Option<Part>, R)> {
-        let part = arguments.sharding.part(folder, self.run)?;
+    ) -> Result<Option<R>> {
+        let part = arguments.sharding.part(clock.folder, self.run)?;
         let shard = shard::of(part.as_ref());
         let begun = Instant::now();
         let bar = progress::bar((self.steps)(shard));
-        let _orderly = interrupt::counted(folder, &bar, self.what);
+        let _orderly = interrupt::counted(clock.folder, &bar, self.what);
         let done = body(shard, &bar);
         bar.finish_and_clear();
         terminal::took(self.stage, begun);
-        Ok((part, done?))
+        let done = done?;
+        clock.save();
+        match part {
+            Some(part) => shard::finish(part, &arguments.common).map(|_| None),
+            None => Ok(Some(done)),
+        }
     }
 }
 
@@ -158,7 +155,7 @@ fn carry_out_published(
     experiment: &Experiment,
     library: &Library,
     clock: &Clock<'_>,
-) -> Result<Done> {
+) -> Result<Option<Finished>> {
     let Common { device, seed, .. } = arguments.common;
     let config = Config::read(&arguments.config)?;
     let session = Session::open(config, library, device, seed)?;
@@ -168,7 +165,7 @@ fn carry_out_published(
         what: "rounds",
         stage: "learning and judging",
     };
-    let (part, results) = work.carry_out(arguments, clock.folder, |shard, bar| {
+    let results = work.carry_out(arguments, clock, |shard, bar| {
         let observer = |step: &FinishedRound<'_>| {
             bar.inc(1);
             bar.set_message(message(step));
@@ -178,11 +175,11 @@ fn carry_out_published(
         };
         session.carry_out(experiment, shard, clock.folder, &observer)
     })?;
-    if let Some(part) = part {
-        return Ok(Done::Part(part));
-    }
+    let Some(results) = results else {
+        return Ok(None);
+    };
     let results = results.finished(command_line(), clock.wall_s());
-    Ok(Done::Whole(Finished {
+    Ok(Some(Finished {
         what: format!("{}, {}", results.experiment, results.task),
         headline: results.headline(),
         text: results.text(),
@@ -194,7 +191,11 @@ fn carry_out_published(
     }))
 }
 
-fn undeclared_effect(arguments: &Arguments, library: Library, clock: &Clock<'_>) -> Result<Done> {
+fn undeclared_effect(
+    arguments: &Arguments,
+    library: Library,
+    clock: &Clock<'_>,
+) -> Result<Option<Finished>> {
     let Common { device, seed, .. } = arguments.common;
     let experiment = undeclared_effect::Experiment::read(&arguments.config)?;
     let session = undeclared_effect::Session::new(experiment, library, device, seed)?;
@@ -204,7 +205,7 @@ fn undeclared_effect(arguments: &Arguments, library: Library, clock: &Clock<'_>)
         what: "trials",
         stage: "trials",
     };
-    let (part, trials) = work.carry_out(arguments, clock.folder, |shard, bar| {
+    let trials = work.carry_out(arguments, clock, |shard, bar| {
         let observer = |trial: &Trial| {
             bar.inc(1);
             bar.set_message(format!("episodes; {} seed {}", trial.case, trial.seed));
@@ -212,15 +213,15 @@ fn undeclared_effect(arguments: &Arguments, library: Library, clock: &Clock<'_>)
         };
         session.run_shard(shard, clock.folder, &observer)
     })?;
-    if let Some(part) = part {
-        return Ok(Done::Part(part));
-    }
+    let Some(trials) = trials else {
+        return Ok(None);
+    };
     let outcome = session.results(&trials);
     let mut value = serde_json::to_value(&outcome)?;
     value["experiment"] = UNDECLARED_EFFECT.into();
     value["command"] = command_line().into();
     value["wall_s"] = clock.wall_s().into();
-    Ok(Done::Whole(Finished {
+    Ok(Some(Finished {
         what: format!("{UNDECLARED_EFFECT}, {}", session.task.name()),
         headline: outcome.headline(),
         text: outcome.text(),

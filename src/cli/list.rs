@@ -3,11 +3,11 @@ use std::path::Path;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::{Answer, Common, inputs, terminal};
 use residyn_control::control::Task;
-use residyn_core::model::{Effect, Library, Model};
+use residyn_core::model::{Effect, EffectParameter, Library, Model, ReadyDrive};
 use residyn_core::plant::Plant;
 use residyn_formats::FORMATS;
 use residyn_io::read_plant;
@@ -60,116 +60,104 @@ const OTHERS: &[(&str, &str)] = &[
     ("jsonl", "rounds of the learning loop, in and out"),
 ];
 
+/// What an entry says, as text and in JSON.
+type Entry = (String, Value);
+
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
-    let (text, value) = match arguments.what {
+    let entries = match arguments.what {
         What::Systems => systems(&library)?,
-        What::Effects => effects(library.effects()),
-        What::Drives => drives(),
+        What::Effects => library.effects().iter().map(effect).collect(),
+        What::Drives => Library::drives().iter().map(drive).collect(),
         What::Plants => plants(&library)?,
         What::Tasks => tasks()?,
         What::Formats => formats(),
     };
+    let (texts, values): (Vec<String>, Vec<Value>) = entries.into_iter().unzip();
     match arguments.common.json {
-        true => terminal::json(&value)?,
-        false => terminal::print(&text)?,
+        true => terminal::json(&values)?,
+        false => terminal::print(&texts.concat())?,
     }
     Ok(Answer::Yes)
 }
 
-fn systems(library: &Library) -> Result<(String, serde_json::Value)> {
-    let (mut text, mut values) = (String::new(), Vec::new());
-    for name in Library::system_names() {
+fn systems(library: &Library) -> Result<Vec<Entry>> {
+    let system = |name: String| {
         let model: Model = library.model(&name)?;
         let parameters: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
+        let (about, list) = (&model.about, parameters.join(", "));
+        Ok((
+            format!("{name}: {about}\n    parameters: {list}\n"),
+            json!({"name": name, "about": about, "joints": model.joints, "parameters": parameters}),
+        ))
+    };
+    Library::system_names().into_iter().map(system).collect()
+}
+
+fn effect(effect: &Effect) -> Entry {
+    let formula = effect.text();
+    let mut text = format!("{}: {}\n    {formula}\n", effect.name, effect.about);
+    for p in &effect.parameters {
         let _ = writeln!(
             text,
-            "{name}: {}\n    parameters: {}",
-            model.about,
-            parameters.join(", ")
+            "    {} [{}] {}; usually about {}",
+            p.name, p.unit, p.about, p.typical
         );
-        values.push(json!({"name": name, "about": model.about, "joints": model.joints, "parameters": parameters}));
     }
-    Ok((text, values.into()))
+    let _ = writeln!(text, "    shown by {}", effect.shown_by);
+    let parameter = |p: &EffectParameter| json!({"name": p.name, "unit": p.unit, "about": p.about, "typical": p.typical});
+    let value = json!({
+        "name": effect.name, "about": effect.about, "formula": formula,
+        "parameters": effect.parameters.iter().map(parameter).collect::<Vec<_>>(),
+        "contains": effect.contains, "confused_with": effect.confused_with, "shown_by": effect.shown_by,
+    });
+    (text, value)
 }
 
-fn effects(effects: &[Effect]) -> (String, serde_json::Value) {
-    let (mut text, mut values) = (String::new(), Vec::new());
-    for effect in effects {
-        let formula = effect.text();
-        let _ = writeln!(text, "{}: {}\n    {formula}", effect.name, effect.about);
-        for p in &effect.parameters {
-            let _ = writeln!(
-                text,
-                "    {} [{}] {}; usually about {}",
-                p.name, p.unit, p.about, p.typical
-            );
-        }
-        let _ = writeln!(text, "    shown by {}", effect.shown_by);
-        let parameter = |p: &residyn_core::model::EffectParameter| json!({"name": p.name, "unit": p.unit, "about": p.about, "typical": p.typical});
-        values.push(json!({
-            "name": effect.name, "about": effect.about, "formula": formula,
-            "parameters": effect.parameters.iter().map(parameter).collect::<Vec<_>>(),
-            "contains": effect.contains, "confused_with": effect.confused_with, "shown_by": effect.shown_by,
-        }));
+fn drive(drive: &ReadyDrive) -> Entry {
+    let torque = drive.text();
+    let mut text = format!("{}: {}\n    {torque}\n", drive.name, drive.about);
+    let mut parameters = Vec::new();
+    for [name, unit, about] in drive.parameters() {
+        let _ = writeln!(text, "    {name} [{unit}] {about}");
+        parameters.push(json!({"name": name, "unit": unit, "about": about}));
     }
-    (text, values.into())
+    let value = json!({"name": drive.name, "about": drive.about, "torque": torque, "parameters": parameters});
+    (text, value)
 }
 
-fn drives() -> (String, serde_json::Value) {
-    let (mut text, mut values) = (String::new(), Vec::new());
-    for drive in Library::drives() {
-        let _ = writeln!(
-            text,
-            "{}: {}\n    {}",
-            drive.name,
-            drive.about,
-            drive.text()
-        );
-        for [name, unit, about] in drive.parameters() {
-            let _ = writeln!(text, "    {name} [{unit}] {about}");
-        }
-        let parameter =
-            |[name, unit, about]: [&str; 3]| json!({"name": name, "unit": unit, "about": about});
-        let parameters: Vec<_> = drive.parameters().map(parameter).collect();
-        values.push(json!({"name": drive.name, "about": drive.about, "torque": drive.text(), "parameters": parameters}));
-    }
-    (text, values.into())
-}
-
-fn plants(library: &Library) -> Result<(String, serde_json::Value)> {
-    let (mut text, mut values) = (String::new(), Vec::new());
-    for name in Plant::names() {
+fn plants(library: &Library) -> Result<Vec<Entry>> {
+    let plant = |name: &str| {
         let plant = read_plant(Path::new(name), library)?;
+        let system = &plant.system.name;
         let effects: Vec<String> = (plant.effects.iter())
             .map(|e| format!("{} on joint {}", e.effect.name, e.joint))
             .collect();
-        let with = if effects.is_empty() {
-            "no effects".to_owned()
-        } else {
-            effects.join(", ")
+        let with = match effects.as_slice() {
+            [] => "no effects".to_owned(),
+            effects => effects.join(", "),
         };
-        let _ = writeln!(text, "{name}: {} with {with}", plant.system.name);
-        values.push(json!({"name": name, "system": plant.system.name, "effects": effects}));
-    }
-    Ok((text, values.into()))
+        Ok((
+            format!("{name}: {system} with {with}\n"),
+            json!({"name": name, "system": system, "effects": effects}),
+        ))
+    };
+    Plant::names().into_iter().map(plant).collect()
 }
 
-fn tasks() -> Result<(String, serde_json::Value)> {
-    let (mut text, mut values) = (String::new(), Vec::new());
-    for name in Task::names() {
+fn tasks() -> Result<Vec<Entry>> {
+    let task = |name: &str| {
         let task = Task::read(Path::new(name))?;
-        let _ = writeln!(
-            text,
-            "{name}: {}\n    maximises {}",
-            task.about, task.objective
-        );
-        values.push(json!({"name": name, "system": task.system, "about": task.about, "objective": task.objective}));
-    }
-    Ok((text, values.into()))
+        let (about, objective) = (&task.about, &task.objective);
+        Ok((
+            format!("{name}: {about}\n    maximises {objective}\n"),
+            json!({"name": name, "system": task.system, "about": about, "objective": objective}),
+        ))
+    };
+    Task::names().into_iter().map(task).collect()
 }
 
-fn formats() -> (String, serde_json::Value) {
+fn formats() -> Vec<Entry> {
     let models = FORMATS.iter().map(|format| {
         let read = format.robots.as_ref();
         let read = read.map_or_else(String::new, |robots| format!("; {}, in", robots.about));
@@ -178,10 +166,12 @@ fn formats() -> (String, serde_json::Value) {
     let others = OTHERS
         .iter()
         .map(|(name, what)| (*name, (*what).to_owned()));
-    let all: Vec<_> = models.chain(others).collect();
-    let text = all.iter().map(|(name, what)| format!("{name}: {what}\n"));
-    let values = all
-        .iter()
-        .map(|(name, what)| json!({"name": name, "about": what}));
-    (text.collect(), values.collect())
+    let all = models.chain(others);
+    all.map(|(name, about)| {
+        (
+            format!("{name}: {about}\n"),
+            json!({"name": name, "about": about}),
+        )
+    })
+    .collect()
 }
