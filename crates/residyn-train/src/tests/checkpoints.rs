@@ -1,7 +1,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{fit, hybrid, parameter, pendulum, rng, transitions};
+use super::{epochs, fit, hybrid, parameter, pendulum, rng, transitions};
 use crate::{Backend, Checkpoint, FitSettings, HybridModel, Training, save};
 use residyn_core::model::{LastLayer, MlpSettings, Origin};
 
@@ -16,10 +16,7 @@ fn origin() -> Origin {
 fn trained(c_g: f64) -> Training {
     let segments = transitions(20, 0.0, 1);
     let model = hybrid((c_g, 2.0), &segments, Backend::NdArray, LastLayer::Random);
-    let settings = FitSettings {
-        epochs: 3,
-        ..FitSettings::default()
-    };
+    let settings = epochs(3);
     fit(model, &segments, settings)
 }
 

@@ -4,9 +4,9 @@ use burn::tensor::Device;
 use rand::RngExt;
 
 use super::{
-    Gradient, fit, gradient, hybrid, hybrid_of, one_joint, parameter, rng, run, transitions,
+    Gradient, epochs, fit, gradient, hybrid, hybrid_of, one_joint, parameter, rng, run, transitions,
 };
-use crate::{Backend, Batch, FitSettings, HybridModel, Objective, Segments, Training};
+use crate::{Backend, Batch, HybridModel, Objective, Segments, Training};
 use residyn_core::model::{
     Angles, Dynamics, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn,
 };
@@ -163,10 +163,7 @@ fn the_same_run_twice_has_the_same_bits() {
     let segments = transitions(777, -0.5, 1);
     let run = || {
         let model = hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Random);
-        let settings = FitSettings {
-            epochs: 50,
-            ..FitSettings::default()
-        };
+        let settings = epochs(50);
         fit(model, &segments, settings).model().weights()
     };
     let first = run();
@@ -179,10 +176,7 @@ fn the_same_run_twice_has_the_same_bits() {
 fn fused_and_composed_runs_reach_the_same_error() {
     let segments = transitions(500, -0.5, 1);
     let model = hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Zero);
-    let settings = FitSettings {
-        epochs: 300,
-        ..FitSettings::default()
-    };
+    let settings = epochs(300);
     let mut composed = Training::new(model.clone(), settings.clone(), rng(3)).unwrap();
     composed.objective = composed.objective.composed();
     run(&mut composed, &segments);

@@ -117,6 +117,14 @@ pub(super) fn hybrid_of(
         .unwrap()
 }
 
+/// The usual settings with this many epochs.
+pub(super) fn epochs(epochs: usize) -> FitSettings {
+    FitSettings {
+        epochs,
+        ..FitSettings::default()
+    }
+}
+
 /// A run of all epochs without validation.
 pub(super) fn fit(model: HybridModel, segments: &Segments, settings: FitSettings) -> Training {
     let mut training = Training::new(model, settings, rng(3)).unwrap();

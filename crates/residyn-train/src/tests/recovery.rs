@@ -1,6 +1,6 @@
 use std::ops::ControlFlow;
 
-use super::{fit, hybrid, hybrid_of, rng, transitions};
+use super::{epochs, fit, hybrid, hybrid_of, rng, transitions};
 use crate::{Backend, FitSettings, HybridModel, LearningRates, Penalty, Segments, Training};
 use residyn_core::model::{LastLayer, MlpSettings};
 
@@ -75,10 +75,7 @@ fn a_network_learns_the_dynamics_and_then_serves_as_prior() {
     let new = |last| segments.network(&settings, last, &mut rng(7));
     let device = Backend::NdArray.device();
     let model = HybridModel::network("pendulum", 1, &new(LastLayer::Random), &device).unwrap();
-    let short = FitSettings {
-        epochs: 300,
-        ..FitSettings::default()
-    };
+    let short = epochs(300);
     let offline = fit(model, &segments, short.clone());
     let error = |k: usize, training: &Training| training.history()[k].error;
     assert!(error(3, &offline) < 0.02 * error(0, &offline));

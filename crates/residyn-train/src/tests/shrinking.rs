@@ -1,6 +1,6 @@
 //! Weight decay and decreasing learning rates.
 
-use super::{fit, hybrid, rng, transitions};
+use super::{epochs, fit, hybrid, rng, transitions};
 use crate::{Backend, FitSettings, HybridModel, LearningRates, Training};
 use residyn_core::model::{LastLayer, MlpWeights};
 
@@ -13,22 +13,15 @@ fn residual(model: &HybridModel) -> Vec<f64> {
     model.weights().residual.unwrap().flat()
 }
 
-fn settings(epochs: usize) -> FitSettings {
-    FitSettings {
-        epochs,
-        ..FitSettings::default()
-    }
-}
-
 #[test]
 fn weight_decay_applies_to_weights_and_not_to_physical_parameters() {
     let segments = transitions(20, -0.5, 1);
     let model = hybrid((14.0, 3.5), &segments, Backend::NdArray, LastLayer::Random);
     let decaying = FitSettings {
         weight_decay: 2.0,
-        ..settings(1)
+        ..epochs(1)
     };
-    let (with, without) = (after(&model, decaying), after(&model, settings(1)));
+    let (with, without) = (after(&model, decaying), after(&model, epochs(1)));
     let numbers = residual(&with)
         .into_iter()
         .zip(residual(&without))
@@ -57,7 +50,7 @@ fn weight_decay_does_not_apply_to_a_prior_below_a_residual() {
             prior: 1e-9,
             ..LearningRates::default()
         },
-        ..settings(1)
+        ..epochs(1)
     };
     let prior = |model: &HybridModel| model.weights().prior.unwrap().flat();
     let still = prior(&after(&both, decaying.clone()));
@@ -91,10 +84,10 @@ fn learning_rates_fall_from_one_to_the_annealed_share() {
     let model = hybrid((14.0, 3.5), &segments, Backend::NdArray, LastLayer::Random);
     let falling = FitSettings {
         anneal: 1e-9,
-        ..settings(2)
+        ..epochs(2)
     };
     // The first step is taken at the full rate, the last at a billionth.
-    let (two, one) = (after(&model, falling), after(&model, settings(1)));
+    let (two, one) = (after(&model, falling), after(&model, epochs(1)));
     let off = residual(&two)
         .into_iter()
         .zip(residual(&one))
@@ -104,7 +97,7 @@ fn learning_rates_fall_from_one_to_the_annealed_share() {
         model,
         FitSettings {
             anneal: 1.5,
-            ..settings(2)
+            ..epochs(2)
         },
         rng(2),
     );
