@@ -1,10 +1,9 @@
 use std::path::Path;
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
 use residyn_core::model::Origin;
+use residyn_core::rng;
 use residyn_formats::Imported;
 use residyn_train::{Backend, CheckpointError, FitSettings, HybridModel, Training, save};
 
@@ -31,7 +30,7 @@ pub fn save_imported(
         integrator: description.integrator,
         ..FitSettings::default()
     };
-    let training = Training::new(model, settings, ChaCha8Rng::seed_from_u64(seed))?;
+    let training = Training::new(model, settings, rng(seed))?;
     let (step_s, exported) = (description.step_s, description.origin);
     let origin = Origin {
         config: json!({"command": "import", "step_s": step_s, "origin": exported}),

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::{Context, anyhow};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use anyhow::{Context, Error, anyhow};
+use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 use super::answer::answer;
@@ -19,6 +18,7 @@ use super::mechanics::Pair;
 use residyn_core::closeloop::{Outcome, Request, Settings, Split, StudyError, close_loop};
 use residyn_core::data::{Log, LogError};
 use residyn_core::model::{Library, Model};
+use residyn_core::rng;
 use residyn_io::files::content_hash;
 use residyn_io::read_log;
 use residyn_io::read_model;
@@ -80,8 +80,7 @@ impl Cell {
     /// # Errors
     /// A model file that cannot be read, or rules by which no rig can be drawn.
     pub fn settled(&self, library: &Library) -> anyhow::Result<Self> {
-        let mut rng =
-            ChaCha8Rng::seed_from_u64(content_hash(format!("{}: rig", self.id).as_bytes()));
+        let mut rng = rng(content_hash(format!("{}: rig", self.id).as_bytes()));
         let recipe = match &self.source {
             Source::Drawn(recipe) => recipe,
             Source::Arm(arm) => {
@@ -98,7 +97,8 @@ impl Cell {
         let drawn = recipe.settle(self, &model, library, &mut rng)?;
         let mut settled = self.drawn(&drawn, &drawn.effects);
         let (_, truth) = settled.record(&model)?;
-        settled.start = recipe.start(&model, &truth.declared, &mut rng)?;
+        let start = recipe.start(&model, &truth.declared, &mut rng);
+        settled.start = start.map_err(Error::msg)?;
         Ok(settled)
     }
 
@@ -176,11 +176,11 @@ impl Cell {
     }
 
     /// Each cell has its own motion and noise.
-    fn rng(&self) -> ChaCha8Rng {
-        ChaCha8Rng::seed_from_u64(content_hash(self.id.as_bytes()))
+    fn rng(&self) -> impl Rng + use<> {
+        rng(content_hash(self.id.as_bytes()))
     }
 
-    fn draw_offset(&self, rng: &mut ChaCha8Rng) -> Pair {
+    fn draw_offset(&self, rng: &mut impl Rng) -> Pair {
         let mut offset = [0.0; 2];
         for effect in &self.effects {
             if effect.name == "sensor_offset" {
@@ -234,5 +234,5 @@ impl Cell {
 /// The method under test.
 fn close(model: &Model, library: &Library, split: Split, seed: u64) -> Result<Outcome, StudyError> {
     let request = Request::new(model, library, split);
-    close_loop(request, &mut ChaCha8Rng::seed_from_u64(seed), &())
+    close_loop(request, &mut rng(seed), &())
 }

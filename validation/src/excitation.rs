@@ -96,15 +96,13 @@ impl Controller {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-
     use super::{Controller, Multisine, chirp, steps};
     use crate::sensors::Speed;
+    use residyn_core::rng;
 
     #[test]
     fn a_multisine_has_the_size_and_the_slope_asked_for() {
-        let sine = Multisine::draw(2.0, [0.5, 3.0], &mut ChaCha8Rng::seed_from_u64(4));
+        let sine = Multisine::draw(2.0, [0.5, 3.0], &mut rng(4));
         let samples = 200_000;
         let at = |k: i32| sine.at(0.001 * f64::from(k));
         let mean_square = (0..samples).map(|k| at(k).powi(2)).sum::<f64>() / f64::from(samples);
@@ -115,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_chirp_and_steps_have_the_size_asked_for() {
-        let rng = &mut ChaCha8Rng::seed_from_u64(4);
+        let rng = &mut rng(4);
         let (chirp, steps) = (
             chirp(2.0, [0.5, 5.0], 1000.0, rng),
             steps(2.0, [0.5, 5.0], 1000.0, rng),

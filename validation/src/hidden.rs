@@ -230,8 +230,7 @@ mod tests {
 
     #[test]
     fn rotor_inertia_acts_on_its_own_joint_alone() {
-        let rotor = Machine::with(double_pendulum(), &[hidden("rotor_inertia", &[("J", 0.1)])]);
-        let heavy = rotor.unwrap();
+        let heavy = Machine::bare(double_pendulum()).hiding(0, "rotor_inertia", &[("J", 0.1)]);
         let bare = Machine::bare(double_pendulum());
         let state = State::at_rest([0.4, 0.3]);
         let commands = [Approach::default(); 2];
@@ -246,25 +245,23 @@ mod tests {
 
     #[test]
     fn a_shift_of_an_unknown_parameter_is_refused() {
-        let shifted = Machine::with(
-            double_pendulum(),
-            &[hidden("parameter_shift", &[("m2", 1.0)])],
-        );
-        assert_ne!(shifted.unwrap().mechanics, double_pendulum());
-        let wrong = Machine::with(
-            double_pendulum(),
-            &[hidden("parameter_shift", &[("m3", 1.0)])],
-        );
+        let shifted = |name| {
+            let effect = hidden("parameter_shift", &[(name, 1.0)]);
+            Machine::with(double_pendulum(), &[effect])
+        };
+        assert_ne!(shifted("m2").unwrap().mechanics, double_pendulum());
+        let wrong = shifted("m3");
         assert_eq!(wrong.unwrap_err(), "`parameter_shift`: the rig has no `m3`");
     }
 
     #[test]
     fn a_compliant_joint_carries_its_encoder_on_the_motor() {
-        for effect in [
-            hidden("backlash", &[("delta", 0.01)]),
-            hidden("joint_compliance", &[("k", 30.0), ("J", 0.01)]),
+        let soft = [("k", 30.0), ("J", 0.01)];
+        for (name, values) in [
+            ("backlash", [("delta", 0.01)].as_slice()),
+            ("joint_compliance", &soft),
         ] {
-            let machine = Machine::with(double_pendulum(), &[effect]).unwrap();
+            let machine = Machine::bare(double_pendulum()).hiding(0, name, values);
             let mut state = State::at_rest([0.4, 0.3]);
             state.motor_q = [0.5, 0.6];
             assert_eq!(machine.encoders(&state), [0.5, 0.3]);
@@ -273,8 +270,8 @@ mod tests {
 
     #[test]
     fn a_disc_off_its_axis_reads_ahead_and_behind() {
-        let disc = hidden("encoder_eccentricity", &[("e_s", 0.02), ("e_c", -0.01)]);
-        let machine = Machine::with(double_pendulum(), &[disc]).unwrap();
+        let disc = [("e_s", 0.02), ("e_c", -0.01)];
+        let machine = Machine::bare(double_pendulum()).hiding(0, "encoder_eccentricity", &disc);
         let read = |q: f64| machine.encoders(&State::at_rest([q, 0.3]));
         assert_eq!(read(0.0), [-0.01, 0.3]);
         assert!((read(FRAC_PI_2)[0] - FRAC_PI_2 - 0.02).abs() < 1e-15);

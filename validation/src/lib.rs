@@ -34,7 +34,7 @@ pub use arm::{Arm, Lacks};
 pub use cell::{Errors, Findings, KnownStructure, Searched};
 pub use condition::{Condition, Driving, Loop};
 pub use coverage::Coverage;
-pub use draw::{DrawError, Drawn, Recipe, Rules};
+pub use draw::{Drawn, Recipe, Rules};
 pub use files::recorded;
 pub use grid::{Cell, GridError, Group, Simulation, Source, cells, read};
 pub use hidden::{Hidden, Label};

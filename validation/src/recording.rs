@@ -149,15 +149,13 @@ pub fn log_name(index: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-
     use crate::condition::{Condition, Driving, Loop};
     use crate::machine::Machine;
     use crate::mechanics::Mechanics;
     use crate::mechanics::tests::pendulum;
     use crate::sensors::Flaws;
     use residyn_core::data::Log;
+    use residyn_core::rng;
 
     /// Without gravity.
     const WHEEL: Mechanics = Mechanics::Pendulum {
@@ -191,7 +189,7 @@ mod tests {
     }
 
     fn record(machine: &Machine, condition: &Condition, offset: f64) -> Log {
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut rng = rng(1);
         machine.record(&driving(), condition, 0, [offset, 0.0], &mut rng)
     }
 

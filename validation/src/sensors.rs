@@ -150,10 +150,8 @@ impl Speed {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-
     use super::{Clock, Flaws, Losses};
+    use residyn_core::rng;
 
     const MESSY: Flaws = Flaws {
         jitter: 0.2,
@@ -166,7 +164,7 @@ mod tests {
 
     #[test]
     fn steps_of_a_clock_vary_as_much_as_asked_for_and_time_rises() {
-        let rng = &mut ChaCha8Rng::seed_from_u64(3);
+        let rng = &mut rng(3);
         let mut clock = Clock::new(100.0, &MESSY);
         let times: Vec<f64> = (0..20_000).map(|_| clock.next(rng)).collect();
         let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -179,7 +177,7 @@ mod tests {
 
     #[test]
     fn rows_are_lost_in_the_share_asked_for_and_several_at_once() {
-        let rng = &mut ChaCha8Rng::seed_from_u64(3);
+        let rng = &mut rng(3);
         let mut losses = Losses::new(&MESSY);
         let lost: Vec<bool> = (0..100_000).map(|_| losses.next(rng)).collect();
         let count = lost.iter().filter(|lost| **lost).count();

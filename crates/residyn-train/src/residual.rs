@@ -2,8 +2,7 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 
 use super::{
     Backend, CheckpointError, FitSettings, HybridModel, LearningRates, Penalty, Segments,
@@ -72,7 +71,7 @@ impl ResidualTrainer {
         let network = training.network(&settings, LastLayer::Zero, &mut rng);
         let model = HybridModel::physics(&task.equations, &self.backend.device())?;
         // Batches are full: no order is drawn.
-        let order = ChaCha8Rng::seed_from_u64(0);
+        let order = residyn_core::rng(0);
         let settings = fit_settings(&task.settings);
         let mut run = Training::new(model.with_residual(&network)?, settings, order)?;
         run.run(&training, Some(&validation), &mut |at| {

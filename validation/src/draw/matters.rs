@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::{Result, anyhow};
+use anyhow::{Error, Result, anyhow};
 use rand::Rng;
 
 use super::recipe::{Drawn, Recipe};
@@ -30,12 +30,13 @@ impl Recipe {
         rng: &mut impl Rng,
     ) -> Result<Drawn> {
         for _ in 0..RIGS {
-            let mut drawn = self.draw(rng)?;
+            let mut drawn = self.draw(rng).map_err(Error::msg)?;
             for _ in 0..EFFECTS {
                 let Some(place) = self.idle(cell, &drawn, model, library)? else {
                     return Ok(drawn);
                 };
-                self.draw_effect(&mut drawn, place, rng)?;
+                self.draw_effect(&mut drawn, place, rng)
+                    .map_err(Error::msg)?;
             }
         }
         Err(anyhow!(

@@ -3,11 +3,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-use super::error::DrawError;
 use super::rules::{Kind, Rules, StandIn};
 use super::size::Size;
 use crate::condition::{Condition, Driving};
@@ -18,6 +16,7 @@ use crate::mechanics::Mechanics;
 use crate::sensors::Flaws;
 use residyn_core::data::Joint;
 use residyn_core::model::Model;
+use residyn_core::rng;
 
 /// The recipe that a rig is drawn from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,13 +53,12 @@ impl Recipe {
                 "the plant needs {joints} numbers in `speed`, one per joint"
             ));
         }
-        let rng = &mut ChaCha8Rng::seed_from_u64(0);
-        let drawn = self.draw(rng).map_err(|error| error.to_string())?;
+        let rng = &mut rng(0);
+        let drawn = self.draw(rng)?;
         let all = self.rules.effects.iter().chain(&self.rules.outside);
         for (name, kind) in all {
             for joint in Joint::all(joints) {
-                let effect = self.hidden(name, joint, &kind.values, self.scales(joint), rng);
-                let effect = effect.map_err(|error| error.to_string())?;
+                let effect = self.hidden(name, joint, &kind.values, self.scales(joint), rng)?;
                 if kind.joint.is_none_or(|only| only == joint) {
                     Machine::with(self.mechanics.clone(), &[effect])?;
                 }
@@ -73,7 +71,7 @@ impl Recipe {
     ///
     /// # Errors
     /// Rules that leave no effect to draw, or name an unknown scale.
-    pub fn draw(&self, rng: &mut impl Rng) -> Result<Drawn, DrawError> {
+    pub fn draw(&self, rng: &mut impl Rng) -> Result<Drawn, String> {
         let mut drawn = Drawn {
             simulation: Simulation {
                 mechanics: self.mechanics.clone(),
@@ -98,7 +96,7 @@ impl Recipe {
         drawn: &mut Drawn,
         place: usize,
         rng: &mut impl Rng,
-    ) -> Result<(), DrawError> {
+    ) -> Result<(), String> {
         if place < drawn.effects.len() {
             drawn.effects.remove(place);
         }
@@ -116,7 +114,7 @@ impl Recipe {
             left -= kind.weight;
             left <= 0.0
         });
-        let (name, kind, joint) = chosen.ok_or(DrawError::NothingLeft)?;
+        let (name, kind, joint) = chosen.ok_or("the rules leave no effect to draw")?;
         let hidden = self.hidden(name, *joint, &kind.values, self.scales(*joint), rng)?;
         if place >= self.effects {
             drawn.stand_ins[place - self.effects] = self.stand_ins(&hidden, rng)?;
@@ -148,13 +146,13 @@ impl Recipe {
         model: &Model,
         declared: &BTreeMap<String, f64>,
         rng: &mut impl Rng,
-    ) -> Result<BTreeMap<String, f64>, DrawError> {
+    ) -> Result<BTreeMap<String, f64>, String> {
         let factor = self.rules.start.plain(rng)?;
         let free = model.parameters.iter().filter(|parameter| !parameter.fixed);
         free.map(|parameter| {
             let name = &parameter.name;
             let value = declared.get(name);
-            let value = value.ok_or_else(|| DrawError::NoTrueValue(name.clone()))?;
+            let value = value.ok_or_else(|| format!("the true value of `{name}` is not known"))?;
             let off = factor.powf(rng.random_range(-1.0..=1.0));
             Ok((name.clone(), value * off))
         })
@@ -183,15 +181,11 @@ impl Recipe {
         sizes: &BTreeMap<String, Size>,
         mut scales: BTreeMap<String, f64>,
         rng: &mut impl Rng,
-    ) -> Result<Hidden, DrawError> {
+    ) -> Result<Hidden, String> {
         let mut values = BTreeMap::new();
         for (parameter, size) in sizes {
             let drawn = size.draw(&scales, rng);
-            let value = drawn.map_err(|why| DrawError::Number {
-                effect: name.to_owned(),
-                parameter: parameter.clone(),
-                why: Box::new(why),
-            })?;
+            let value = drawn.map_err(|why| format!("`{name}`: `{parameter}`: {why}"))?;
             scales.insert(parameter.clone(), value);
             values.insert(parameter.clone(), value);
         }
@@ -202,7 +196,7 @@ impl Recipe {
         })
     }
 
-    fn stand_ins(&self, outside: &Hidden, rng: &mut impl Rng) -> Result<Vec<Hidden>, DrawError> {
+    fn stand_ins(&self, outside: &Hidden, rng: &mut impl Rng) -> Result<Vec<Hidden>, String> {
         let mut scales = self.scales(outside.joint);
         scales.extend(outside.values.clone());
         let stand_ins = self.rules.outside[&outside.name].stand_ins.iter();
@@ -211,14 +205,14 @@ impl Recipe {
         stand_ins.map(hidden).collect()
     }
 
-    fn condition(&self, rng: &mut impl Rng) -> Result<Condition, DrawError> {
+    fn condition(&self, rng: &mut impl Rng) -> Result<Condition, String> {
         let rules = &self.rules.condition;
         let mut loops = rules.loops.clone();
         while loops.len() > 2 {
             loops.remove(rng.random_range(0..loops.len()));
         }
         if rules.filter_s.is_empty() {
-            return Err(DrawError::NoFilter);
+            return Err("`filter_s` needs a number".to_owned());
         }
         let quantum = TAU / 2.0_f64.powf(rules.bits.plain(rng)?);
         Ok(Condition {

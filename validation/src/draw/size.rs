@@ -5,8 +5,6 @@ use std::collections::BTreeMap;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-use super::error::DrawError;
-
 /// Numbers from `from` to `to`: evenly spread on a logarithmic scale if both are positive, else on a linear one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -36,11 +34,7 @@ impl Size {
     ///
     /// # Errors
     /// `of` names none of the `scales`.
-    pub fn draw(
-        &self,
-        scales: &BTreeMap<String, f64>,
-        rng: &mut impl Rng,
-    ) -> Result<f64, DrawError> {
+    pub fn draw(&self, scales: &BTreeMap<String, f64>, rng: &mut impl Rng) -> Result<f64, String> {
         let place = rng.random::<f64>();
         let number = if self.from > 0.0 && self.to > 0.0 {
             self.from * (self.to / self.from).powf(place)
@@ -52,34 +46,32 @@ impl Size {
         let scale = match &self.of {
             Some(name) => scales
                 .get(name)
-                .ok_or_else(|| DrawError::NoScale(name.clone()))?,
+                .ok_or_else(|| format!("no scale `{name}`"))?,
             None => &1.0,
         };
         Ok(if negative { -number } else { number } * scale)
     }
 
     /// A number that is not a multiple of a scale.
-    pub fn plain(&self, rng: &mut impl Rng) -> Result<f64, DrawError> {
+    pub fn plain(&self, rng: &mut impl Rng) -> Result<f64, String> {
         self.draw(&BTreeMap::new(), rng)
     }
 
     /// A count.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small count
-    pub fn count(&self, rng: &mut impl Rng) -> Result<usize, DrawError> {
+    pub fn count(&self, rng: &mut impl Rng) -> Result<usize, String> {
         Ok(self.plain(rng)?.round() as usize)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-
     use super::Size;
+    use residyn_core::rng;
 
     #[test]
     fn numbers_keep_to_their_range_scale_and_sign() {
-        let rng = &mut ChaCha8Rng::seed_from_u64(1);
+        let rng = &mut rng(1);
         let size: Size =
             toml::from_str("from = 0.5\nto = 8.0\nof = 'torque'\nsigned = true").unwrap();
         let scales = [("torque".to_owned(), 2.0)].into();
@@ -93,7 +85,7 @@ mod tests {
         };
         assert!((share(&|x| x.abs() < 4.0) - 0.5).abs() < 0.03);
         assert!((share(&|x| x < 0.0) - 0.5).abs() < 0.03);
-        let message = size.draw(&[].into(), rng).unwrap_err().to_string();
+        let message = size.draw(&[].into(), rng).unwrap_err();
         assert_eq!(message, "no scale `torque`");
         let whole: Size = toml::from_str("from = -3\nto = 3\nwhole = true").unwrap();
         assert!((0..100).all(|_| whole.plain(rng).unwrap().fract() == 0.0));

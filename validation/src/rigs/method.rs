@@ -2,8 +2,6 @@
 
 use std::fmt;
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::errors::{LogErrors, by_log, errors_on};
@@ -16,6 +14,7 @@ use residyn_core::closeloop::{
 };
 use residyn_core::data::Log;
 use residyn_core::model::{Library, Model};
+use residyn_core::rng;
 
 /// A model that is scored.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -198,7 +197,7 @@ fn closed(
     let split = Split::given(fold.train.clone(), fold.test.clone());
     let mut request = Request::new(&rig.declared, tools.library, split);
     request.learner = tools.learner;
-    let outcome = close_loop(request, &mut ChaCha8Rng::seed_from_u64(tools.seed), watch)?;
+    let outcome = close_loop(request, &mut rng(tools.seed), watch)?;
     let errors = &outcome.errors;
     let hybrid = errors.hybrid.as_ref().unwrap_or(&errors.after);
     let models = [

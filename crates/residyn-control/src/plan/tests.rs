@@ -1,9 +1,7 @@
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-
 use super::proposal::Proposal;
 use super::{Cem, Evaluate, Icem, Method, Mppi, Plan, Planner, Settings};
 use residyn_core::lanes::Arch;
+use residyn_core::rng;
 use residyn_core::sim::batch::{Rows, W};
 
 mod noise;
@@ -15,10 +13,6 @@ const SETTINGS: Settings = Settings {
     horizon: 6,
     method: Method::Cem(Cem { elite: 20 }),
 };
-
-fn rng(seed: u64) -> ChaCha8Rng {
-    ChaCha8Rng::seed_from_u64(seed)
-}
 
 /// The closer every input is to a goal, the better; from 2 on the return is unknown.
 struct Near;

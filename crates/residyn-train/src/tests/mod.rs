@@ -16,20 +16,16 @@ use std::ops::ControlFlow;
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::RngExt;
 
 use super::hybrid::vector;
 use super::loss::numbers;
 use super::{Backend, Batch, Ended, FitSettings, HybridModel, Objective, Segments, Training};
 use residyn_core::expr::{Graph, Scope, SignForm, parse};
 use residyn_core::model::{Dynamics, LastLayer, MlpSettings, MlpWeights, Parameter};
+pub(super) use residyn_core::rng;
 
 pub(super) const DT: f64 = 0.02;
-
-pub(super) fn rng(seed: u64) -> ChaCha8Rng {
-    ChaCha8Rng::seed_from_u64(seed)
-}
 
 pub(super) fn parameter(name: &str, value: f64) -> Parameter {
     Parameter {
