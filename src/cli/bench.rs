@@ -11,11 +11,10 @@ use serde_json::json;
 
 use super::call::{Begun, files};
 use super::shard::{self, Sharding, program_id};
-use super::work::{self, Store};
 use super::{Answer, Common, message, progress, terminal};
 use residyn_core::model::Library;
 use residyn_io::files::content_id;
-use residyn_io::runs::{Identity, RunFolder};
+use residyn_io::runs::{Identity, Lines, RunFolder};
 use residyn_report::ResultsPage;
 use residyn_validation::{Cell, Line, Source, markdown, read, recorded, summarise};
 
@@ -135,17 +134,19 @@ fn identity(cells: &[Cell]) -> Result<Identity> {
 fn close_all(cells: &[Cell], folder: &RunFolder) -> Result<Vec<Line>> {
     let program = program_id()?;
     let key = |line: &Line| line.configuration.clone() + &line.program;
-    let mut store = Store::open(folder, "cells.jsonl", key)?;
+    let mut store = Lines::open(folder, "cells.jsonl", key)?;
     let library = Library::built_in();
     let close = |cell: &Cell, bar: &ProgressBar| {
         bar.set_message(cell.id.clone());
         let configuration = configuration(cell)?;
         let key = configuration.clone() + &program;
-        let line = store.or_make(key, || Ok(line(cell, configuration, &program, &library)))?;
+        let line = store.find_or_make(&key, || -> Result<_> {
+            Ok(line(cell, configuration, &program, &library))
+        })?;
         Ok(line.clone())
     };
     terminal::stage("closing the loops", || {
-        work::each(folder, "cells", cells, close)
+        progress::each(folder, "cells", cells, close)
     })
 }
 

@@ -29,7 +29,6 @@ mod sweep;
 mod terminal;
 mod train;
 mod tune;
-mod work;
 
 use std::ffi::OsString;
 use std::fmt::Display;

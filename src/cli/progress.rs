@@ -6,10 +6,12 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use anyhow::Result;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::terminal;
+use super::{interrupt, terminal};
 use residyn_core::closeloop::{Fits, Progress, Stage, StageTimes, Watch};
+use residyn_io::runs::RunFolder;
 
 /// How often a line is written if there is no terminal.
 const EVERY: Duration = Duration::from_secs(10);
@@ -168,6 +170,25 @@ impl Seen {
             }
         }
     }
+}
+
+/// Do all pieces of work, `what` in the plural, whose results `folder` keeps, with a bar.
+pub(super) fn each<P, R>(
+    folder: &RunFolder,
+    what: &'static str,
+    pieces: &[P],
+    mut work: impl FnMut(&P, &ProgressBar) -> Result<R>,
+) -> Result<Vec<R>> {
+    let bar = bar(pieces.len());
+    let _orderly = interrupt::counted(folder, &bar, what);
+    let done = pieces.iter().map(|piece| {
+        let result = work(piece, &bar)?;
+        bar.inc(1);
+        Ok(result)
+    });
+    let done = done.collect();
+    bar.finish_and_clear();
+    done
 }
 
 /// Shows on a bar what is done in one of its steps.

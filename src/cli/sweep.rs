@@ -9,10 +9,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::shard::{self, Sharding, program_id};
-use super::work::Store;
 use super::{Answer, Common, command_line, inputs, interrupt, progress, terminal};
 use residyn_io::files::content_id;
-use residyn_io::runs::{Identity, RunFolder};
+use residyn_io::runs::{Identity, Lines, RunFolder};
 use residyn_train::Trained;
 use residyn_train::recipe::{Job, Member, Recipe, SweepResults};
 
@@ -173,7 +172,7 @@ fn train(
     key: &dyn Fn(&Member) -> String,
 ) -> Result<Vec<Stored>> {
     let stored_key = |stored: &Stored| stored.configuration.clone();
-    let mut store = Store::open(folder, "models.jsonl", stored_key)?;
+    let mut store = Lines::open(folder, "models.jsonl", stored_key)?;
     let is_new = |member: &&Member| store.find(&key(member)).is_none();
     let new = members.iter().filter(is_new).count();
     let bar = progress::bar(new * job.recipe.fit.epochs);
@@ -186,7 +185,7 @@ fn train(
     let mut diverged = 0;
     let model = |member: &Member| {
         let configuration = key(member);
-        let stored = store.or_make(configuration.clone(), || {
+        let stored = store.find_or_make(&configuration.clone(), || -> Result<_> {
             let since = Instant::now();
             let trained = job.train_member(member, &mut || bar.inc(1))?;
             diverged += usize::from(trained.diverged);

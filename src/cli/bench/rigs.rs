@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 use serde_json::json;
 
 use super::shard::{self, Sharding, program_id};
-use super::{Answer, Common, message, progress, terminal, unless_panic, work};
+use super::{Answer, Common, message, progress, terminal, unless_panic};
 use crate::cli::call::{Begun, files};
 use residyn_core::model::Library;
 use residyn_formats::ClientError;
@@ -201,7 +201,7 @@ impl Store<'_> {
     fn run(&self, all: &[Work<'_>]) -> Result<(Vec<Line>, BTreeMap<Method, String>)> {
         let line = |work: &Work<'_>, bar: &ProgressBar| Ok((work.method, self.line(work, bar)?));
         let (mut lines, mut not_run) = (Vec::with_capacity(all.len()), BTreeMap::new());
-        for (method, line) in work::each(&self.folder, "results", all, line)? {
+        for (method, line) in progress::each(&self.folder, "results", all, line)? {
             match line {
                 Ok(line) => lines.push(line),
                 Err(reason) => _ = not_run.insert(method, reason),

@@ -6,13 +6,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::cli::shard::program_id;
-use crate::cli::work::{self, Store};
 use crate::cli::{progress, terminal};
 use residyn_core::closeloop::{Calibration, Calibrator, Searched, Simulation};
 use residyn_core::model::InputFile;
 use residyn_core::model::{Model, Origin};
 use residyn_io::files::content_id;
-use residyn_io::runs::RunFolder;
+use residyn_io::runs::{Lines, RunFolder};
 
 /// A simulation that was searched; one line of `simulations.jsonl`.
 #[derive(Serialize, Deserialize)]
@@ -37,9 +36,9 @@ pub fn carry_out(
     calibrator: Calibrator<'_>,
     folder: &RunFolder,
     run: &str,
-) -> Result<(Calibration, Store<Stored>)> {
+) -> Result<(Calibration, Lines<Stored>)> {
     let key = |stored: &Stored| stored.configuration.clone();
-    let mut store = Store::open(folder, "simulations.jsonl", key)?;
+    let mut store = Lines::open(folder, "simulations.jsonl", key)?;
     let configuration =
         |simulation: &Simulation| content_id(json!([run, simulation.key()]).to_string().as_bytes());
     let all = calibrator.simulations();
@@ -54,7 +53,7 @@ pub fn carry_out(
     }
     let search = |simulation: &Simulation, bar: &ProgressBar| {
         let configuration = configuration(simulation);
-        let stored = store.or_make(configuration.clone(), || {
+        let stored = store.find_or_make(&configuration.clone(), || -> Result<_> {
             let what = simulation.about();
             let watch = progress::Step { bar, what };
             Ok(Stored {
@@ -65,7 +64,7 @@ pub fn carry_out(
         Ok(stored.searched.clone())
     };
     let results = terminal::stage("simulating the accepted model", || {
-        work::each(folder, "simulations", all, search)
+        progress::each(folder, "simulations", all, search)
     })?;
     Ok((calibrator.conclude(results), store))
 }

@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -8,43 +9,64 @@ use serde::de::DeserializeOwned;
 use super::{RunFolder, RunFolderError};
 use crate::files::OutputError;
 
-/// A file in the folder of a run to which a line of JSON is added for each result.
-pub struct Lines {
+/// Results by their keys, each a line of JSON in a file in the folder of a run.
+pub struct Lines<R> {
     folder: RunFolder,
     name: &'static str,
+    known: BTreeMap<String, R>,
 }
 
-impl Lines {
+impl<R: Serialize + DeserializeOwned> Lines<R> {
     /// The file of this name, which need not exist yet, and its results. A partial line left by a killed run is cut
     /// off; a line of another version is not a result.
     ///
     /// # Errors
     /// A file that cannot be read or truncated.
-    pub fn open<T: DeserializeOwned>(
+    pub fn open(
         folder: &RunFolder,
         name: &'static str,
-    ) -> Result<(Self, Vec<T>), RunFolderError> {
+        key: fn(&R) -> String,
+    ) -> Result<Self, RunFolderError> {
+        let bytes = folder.bytes(name)?.unwrap_or_default();
+        let whole = bytes.iter().rposition(|byte| *byte == b'\n');
+        let whole = whole.map_or(0, |last| last + 1);
+        let lines = bytes[..whole].split(|byte| *byte == b'\n');
+        let results = lines.filter_map(|line| serde_json::from_slice(line).ok());
         let file = Self {
             folder: folder.clone(),
             name,
+            known: results.map(|result| (key(&result), result)).collect(),
         };
-        let mut bytes = folder.bytes(name)?.unwrap_or_default();
-        let whole = bytes.iter().rposition(|byte| *byte == b'\n');
-        let whole = whole.map_or(0, |last| last + 1);
         if whole < bytes.len() {
-            bytes.truncate(whole);
             file.cut(whole)?;
         }
-        let lines = bytes.split(|byte| *byte == b'\n');
-        let results = lines.filter_map(|line| serde_json::from_slice(line).ok());
-        Ok((file, results.collect()))
+        Ok(file)
+    }
+
+    /// The result with this key, if there is one.
+    pub fn find(&self, key: &str) -> Option<&R> {
+        self.known.get(key)
+    }
+
+    /// The result with this key; if there is none, it is made now and added.
+    ///
+    /// # Errors
+    /// As `make`, or a file that cannot be written.
+    pub fn find_or_make<E: From<RunFolderError>>(
+        &mut self,
+        key: &str,
+        make: impl FnOnce() -> Result<R, E>,
+    ) -> Result<&R, E> {
+        if !self.known.contains_key(key) {
+            let made = make()?;
+            self.add(&made)?;
+            self.known.insert(key.to_owned(), made);
+        }
+        Ok(&self.known[key])
     }
 
     /// Add a result, all of it or nothing; the folder is made if it is missing.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
-    pub fn add(&self, result: &impl Serialize) -> Result<(), RunFolderError> {
+    fn add(&self, result: &R) -> Result<(), RunFolderError> {
         self.folder.make()?;
         let path = self.path();
         let json = serde_json::to_string(result).expect("numbers, texts and names");
@@ -97,9 +119,9 @@ mod tests {
     fn what_is_left_of_a_line_is_cut_off() {
         let parent = tempfile::tempdir().unwrap();
         let folder = RunFolder::open(&parent.path().join("run")).unwrap();
-        let open = || Lines::open::<u32>(&folder, "a.jsonl").unwrap();
-        let (lines, found) = open();
-        assert!(found.is_empty());
+        let open = || Lines::<u32>::open(&folder, "a.jsonl", u32::to_string).unwrap();
+        let lines = open();
+        assert!(lines.known.is_empty());
         lines.add(&1).unwrap();
         lines.add(&20).unwrap();
         let path = folder.path().join("a.jsonl");
@@ -110,8 +132,8 @@ mod tests {
             ("2", vec![], ""),
         ] {
             fs::write(&path, left).unwrap();
-            let (lines, results) = open();
-            assert_eq!(results, found);
+            let lines = open();
+            assert_eq!(lines.known.values().copied().collect::<Vec<_>>(), found);
             assert_eq!(fs::read_to_string(&path).unwrap(), kept);
             lines.add(&4).unwrap();
             assert_eq!(fs::read_to_string(&path).unwrap(), format!("{kept}4\n"));
