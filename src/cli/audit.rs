@@ -6,8 +6,7 @@ use clap::Args;
 use super::{Answer, Common, inputs, remedy, terminal};
 use residyn_core::data::{Audit, Columns, Log, Severity, audit_together, report_repeats};
 use residyn_core::model::Library;
-use residyn_io::read_model;
-use residyn_io::read_standard_log;
+use residyn_io::{read_logs, read_model, read_standard_log};
 
 /// Audit logs: units, signs, sampling, noise, jumps, lags, excitation, what they cannot show, and how to fix them
 #[derive(Debug, Args)]
@@ -62,5 +61,5 @@ fn read(arguments: &Arguments) -> Result<(Vec<Log>, Columns)> {
         return Ok((logs.collect::<Result<_, _>>()?, Columns::default()));
     };
     let model = read_model(model, &Library::built_in())?;
-    Ok((inputs::logs(&arguments.logs, &model)?, model.columns))
+    Ok((read_logs(&arguments.logs, &model)?, model.columns))
 }

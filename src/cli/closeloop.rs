@@ -20,7 +20,7 @@ use residyn_core::model::InputFile;
 use residyn_core::model::{Library, Model, Origin};
 use residyn_core::rng;
 use residyn_io::runs::RunFolder;
-use residyn_io::{plant_from_text, read_model};
+use residyn_io::{plant_from_text, read_logs, read_model};
 use residyn_report as report;
 use residyn_train::ResidualTrainer;
 
@@ -183,8 +183,8 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(M
             declared.free_parameters()
         ));
     }
-    let mut train = inputs::logs(&arguments.train, &declared)?;
-    let mut test = inputs::logs(&arguments.test, &declared)?;
+    let mut train = read_logs(&arguments.train, &declared)?;
+    let mut test = read_logs(&arguments.test, &declared)?;
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
     let logs = || train.iter().chain(&test);
     inputs::print_notes(logs());

@@ -14,7 +14,7 @@ use residyn_core::model::{Dynamics, Model};
 use residyn_core::sim::metric::{
     Summary, TorqueError, assess, summarise, torque_error, torques_leave,
 };
-use residyn_io::read_model;
+use residyn_io::{read_logs, read_model};
 use residyn_train::Checkpoint;
 
 /// Open-loop prediction error of a model or a checkpoint on logs
@@ -76,9 +76,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         bail!("--horizon {bad}: a horizon is a number of seconds above zero");
     }
     let (declared, dynamics) = model(arguments)?;
-    let mut logs = terminal::stage("reading the logs", || {
-        inputs::logs(&arguments.test, &declared)
-    })?;
+    let mut logs = terminal::stage("reading the logs", || read_logs(&arguments.test, &declared))?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
     if let Source::File(file) = arguments.model.source() {
         inputs::print_findings(file, &declared, arguments.common.seed);

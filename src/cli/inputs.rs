@@ -12,7 +12,6 @@ use residyn_core::limits::RUNS;
 use residyn_core::model::check::Severity;
 use residyn_core::model::{Library, Model};
 use residyn_io::effect_files;
-use residyn_io::read_logs;
 use residyn_io::with_effects_in;
 
 /// The effects that model files may name: the built-in ones and the user's own.
@@ -74,11 +73,6 @@ impl ModelArguments {
             _ => unreachable!("clap asks for one of both"),
         }
     }
-}
-
-/// Read logs for a system and leave out the given intervals; notes go to standard error.
-pub(super) fn logs(paths: &[PathBuf], model: &Model) -> Result<Vec<Log>> {
-    Ok(read_logs(paths, model)?)
 }
 
 /// Apply `--leave-out` to two sets of logs at once: an entry may name a log of either.

@@ -298,70 +298,69 @@ fn usual_settings_are_accepted() {
 
 #[test]
 fn bad_settings_are_refused_by_name() {
-    let [cem, icem, mppi] = all();
-    let icem_with = |change: fn(&mut Icem)| {
-        let mut method = Icem::new(20);
-        change(&mut method);
-        Settings {
-            method: Method::Icem(method),
-            ..icem
-        }
+    let read = |[population, iterations, horizon]: [usize; 3], method: &str| -> Settings {
+        toml::from_str(&format!(
+            "population = {population}\niterations = {iterations}\nhorizon = {horizon}\n{method}"
+        ))
+        .unwrap()
     };
-    let mppi_with = |temperature: f64, deviation: f64| Settings {
-        method: Method::Mppi(Mppi {
-            temperature,
-            deviation,
-        }),
-        ..mppi
-    };
-    let with = |population: usize, iterations: usize, horizon: usize| Settings {
-        population,
-        iterations,
-        horizon,
-        ..cem
-    };
-    for (settings, wanted) in [
+    let cem = "method = 'cem'\nelite = 20";
+    for (counts, wanted) in [
         (
-            with(0, 1, 1),
+            [0, 1, 1],
             "`population` is 0; it must be a whole number from 1 to 100000",
         ),
         (
-            with(19, 1, 1),
+            [19, 1, 1],
             "`elite` is 20; it must be a whole number from 1 to 19, the population",
         ),
         (
-            with(20, 0, 1),
+            [20, 0, 1],
             "`iterations` is 0; it must be a whole number from 1 to 10000",
         ),
         (
-            with(20, 1, 2001),
+            [20, 1, 2001],
             "`horizon` is 2001; it must be a whole number from 1 to 2000",
         ),
+    ] {
+        let message = read(counts, cem).check().unwrap_err().to_string();
+        assert_eq!(message, wanted);
+    }
+    let icem = "method = 'icem'\nelite = ";
+    let mppi = "method = 'mppi'\n";
+    for (method, numbers, wanted) in [
         (
-            icem_with(|m| m.elite = 0),
+            icem,
+            "0",
             "`elite` is 0; it must be a whole number from 1 to 300, the population",
         ),
         (
-            icem_with(|m| m.noise_exponent = -1.0),
+            icem,
+            "20\nnoise_exponent = -1.0",
             "`noise_exponent` is -1; it must be from 0 to 10",
         ),
         (
-            icem_with(|m| m.keep = 1.5),
+            icem,
+            "20\nkeep = 1.5",
             "`keep` is 1.5; it must be from 0 to 1",
         ),
         (
-            icem_with(|m| m.momentum = f64::NAN),
+            icem,
+            "20\nmomentum = nan",
             "`momentum` is NaN; it must be at least 0 and below 1",
         ),
         (
-            mppi_with(0.0, 0.1),
+            mppi,
+            "temperature = 0.0",
             "`temperature` is 0; it must be above 0 and at most 10",
         ),
         (
-            mppi_with(0.1, f64::INFINITY),
+            mppi,
+            "deviation = inf",
             "`deviation` is inf; it must be above 0 and at most 10",
         ),
     ] {
+        let settings = read([300, 10, 6], &(method.to_owned() + numbers));
         assert_eq!(settings.check().unwrap_err().to_string(), wanted);
     }
 }
