@@ -7,12 +7,12 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::declared_body::PARTS;
 use super::intervals::Uncertainty;
 use super::outcome::Fit;
 use super::sensitivity::{LANES, Local, Tangent};
 use super::values::{Column, Values};
 use crate::lanes::Row;
+use crate::model::chain::PARTS;
 use crate::model::{Dynamics, Model, Parameter};
 
 /// A body's parameter together with the parameters that affect the torques of these logs in the same way.

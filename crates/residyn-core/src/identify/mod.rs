@@ -8,7 +8,6 @@
 mod active_set;
 mod balance;
 mod combinations;
-mod declared_body;
 mod distance;
 mod fit;
 mod identifiability;

@@ -1,7 +1,7 @@
-use super::declared_body::{DeclaredBody, PARTS};
 use super::normal_equations::WindowTerms;
 use super::values::{Column, Values};
 use crate::model::Model;
+use crate::model::chain::{Divergence, PARTS};
 
 /// What is known of a model's values apart from the logs: that the declared ones are of the right size. Of all values
 /// with which a model explains the logs equally well, the fit finds those nearest to the declared ones.
@@ -19,6 +19,15 @@ pub(super) struct Prior {
 struct Declared {
     parameter: usize,
     value: f64,
+}
+
+/// A body's values are physical, and near the declared ones.
+#[derive(Debug, Clone)]
+struct DeclaredBody {
+    /// The model's parameters, in the order of the parts.
+    parameters: [usize; PARTS],
+    /// From the declared values.
+    divergence: Divergence,
 }
 
 /// A ratio to the declared value counts as small below one over this: zero departs as far from it as a tenfold value
@@ -40,7 +49,13 @@ impl Prior {
         // Effects in the file are declared as well, except for their per-log values.
         let all = model.all_parameters();
         let value = |parameter: usize| all[parameter].value;
-        let body = |parts: [usize; PARTS]| DeclaredBody::new(parts, &parts.map(value));
+        let body = |parameters: [usize; PARTS]| {
+            let divergence = Divergence::from_nearest_body(&parameters.map(value))?;
+            Some(DeclaredBody {
+                parameters,
+                divergence,
+            })
+        };
         let bodies: Vec<DeclaredBody> = model.inertias().into_iter().filter_map(body).collect();
         let is_of_body = |parameter: &usize| {
             let mut parts = bodies.iter().flat_map(|body| &body.parameters);
@@ -94,7 +109,9 @@ impl Prior {
         let prior_costs = self.prior_costs(columns, values);
         let of_values = 0.5 * prior_costs.map(|(_, d, _)| d * d).sum::<f64>();
         let bodies = self.free_bodies(columns, values);
-        let of_bodies: f64 = bodies.map(|(body, parts, _)| body.cost(&parts)).sum();
+        let of_bodies: f64 = bodies
+            .map(|(body, parts, _)| body.divergence.of(&parts))
+            .sum();
         residuals * (of_values + of_bodies)
     }
 
@@ -120,10 +137,10 @@ impl Prior {
     ) -> WindowTerms {
         let mut terms = WindowTerms::zeros(columns.len());
         for (body, parts, places) in self.free_bodies(columns, values) {
-            let Some((gradient, hessian)) = body.terms(&parts) else {
+            let Some((gradient, hessian)) = body.divergence.terms(&parts) else {
                 continue;
             };
-            terms.cost += residuals * body.cost(&parts);
+            terms.cost += residuals * body.divergence.of(&parts);
             let free = || (0..PARTS).filter_map(|k| Some((k, places[k]?)));
             for (k, row) in free() {
                 terms.gradient[row] += residuals * gradient[k];

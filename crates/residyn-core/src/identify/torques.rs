@@ -1,10 +1,10 @@
-use super::declared_body::{PARTS, physical_parts};
 use super::fit::fit_by;
 use super::outcome::{Fit, FitError};
 use super::shooting::Shooting;
 use super::solver::Solver;
 use crate::data::Log;
 use crate::model::Model;
+use crate::model::chain::physical_parts;
 use crate::sim::cut;
 
 /// Length of the windows that are left out or resampled as one, s.
@@ -62,7 +62,7 @@ pub fn fit_torques<'l>(
 fn with_physical_bodies(model: &Model) -> Model {
     let mut model = model.clone();
     for body in model.inertias() {
-        let parts: [f64; PARTS] = body.map(|parameter| model.parameters[parameter].value);
+        let parts = body.map(|parameter| model.parameters[parameter].value);
         let Some(physical) = physical_parts(&parts) else {
             continue;
         };

@@ -26,14 +26,9 @@ pub(super) struct Base {
 impl Base {
     /// Whether the combination is a sum of quantities that are never negative.
     pub fn is_positive(&self) -> bool {
-        let positive = |kind: &Kind| match kind {
-            Kind::Tensor(a, b) => a == b,
-            Kind::Moment(_) => false,
-            Kind::Mass | Kind::Rotor => true,
-        };
         let mut others = self.others.iter();
-        positive(&self.column.kind)
-            && others.all(|(factor, kind, _)| *factor > 0.0 && positive(kind))
+        self.column.kind.is_never_negative()
+            && others.all(|(factor, kind, _)| *factor > 0.0 && kind.is_never_negative())
     }
 }
 

@@ -7,21 +7,10 @@ use nalgebra::Vector3;
 use super::body::{Chain, Joint, places};
 use super::equations::Kind;
 use super::formula::number;
-use super::model_file::{name, quoted, unit};
+use super::model_file::{gravity_parameter, name, parameter, quoted};
 use super::recursive::Place;
 use super::series::rounded;
 use crate::data;
-
-/// First moments and inertia tensor, in the order of the file.
-const MOMENT: [Kind; 3] = [Kind::Moment(0), Kind::Moment(1), Kind::Moment(2)];
-const TENSOR: [Kind; 6] = [
-    Kind::Tensor(0, 0),
-    Kind::Tensor(0, 1),
-    Kind::Tensor(0, 2),
-    Kind::Tensor(1, 1),
-    Kind::Tensor(1, 2),
-    Kind::Tensor(2, 2),
-];
 
 /// The bodies of a chain.
 pub(super) struct Bodies<'c>(pub &'c Chain);
@@ -32,15 +21,11 @@ impl Bodies<'_> {
         let mut text = "\n[parameters]\n".to_owned();
         for (number, joint) in self.links() {
             if has_inertia(joint) {
-                parameters(&mut text, number, joint);
+                text += &parameters(number, joint);
             }
         }
-        let g = self.0.gravity.norm();
-        if g > 0.0 {
-            let _ = writeln!(
-                text,
-                "g = {{ value = {g:?}, unit = \"m/s^2\", fixed = true }}"
-            );
+        if self.0.gravity.norm() > 0.0 {
+            text += &gravity_parameter(self.0);
         }
         let _ = write!(text, "\n[chain]\ngravity = {}\n", self.gravity());
         let places = places(&self.0.joints);
@@ -53,12 +38,7 @@ impl Bodies<'_> {
     /// The parameters of the bodies: name, kind and joint.
     pub fn parameters(&self) -> Vec<(String, Kind, data::Joint)> {
         let links = self.links().filter(|(_, joint)| has_inertia(joint));
-        let all = |number| {
-            let kinds = [&[Kind::Mass], &MOMENT[..], &TENSOR[..]].concat();
-            kinds
-                .into_iter()
-                .map(move |kind| (name(kind, number), kind, number))
-        };
+        let all = |number| Kind::OF_BODY.map(|kind| (name(kind, number), kind, number));
         links.flat_map(|(number, _)| all(number)).collect()
     }
 
@@ -86,31 +66,18 @@ fn has_inertia(joint: &Joint) -> bool {
     joint.inertia.mass > 0.0 || joint.inertia.tensor.norm() > 0.0
 }
 
-fn parameters(text: &mut String, number: data::Joint, joint: &Joint) {
-    let mut line = |kind: Kind, about: &str| {
-        let never_negative =
-            matches!(kind, Kind::Mass) || matches!(kind, Kind::Tensor(a, b) if a == b);
-        let positive = if never_negative {
-            ", positive = true"
-        } else {
-            ""
+fn parameters(number: data::Joint, joint: &Joint) -> String {
+    let line = |kind: Kind| {
+        let what = match kind {
+            Kind::Mass | Kind::Rotor => "mass",
+            Kind::Moment(_) => "mass times centre of mass",
+            Kind::Tensor(..) => "inertia tensor",
         };
-        let _ = writeln!(
-            text,
-            "{} = {{ value = {:?}, unit = \"{}\"{positive}, about = {} }}",
-            name(kind, number),
-            rounded(kind.value(joint)),
-            unit(kind),
-            quoted(&format!("{about} of {}", joint.body))
-        );
+        let about = format!("{what} of {}", joint.body);
+        let is_positive = kind.is_never_negative();
+        parameter(kind, number, kind.value(joint), is_positive, &about)
     };
-    line(Kind::Mass, "mass");
-    for kind in MOMENT {
-        line(kind, "mass times centre of mass");
-    }
-    for kind in TENSOR {
-        line(kind, "inertia tensor");
-    }
+    Kind::OF_BODY.map(line).concat()
 }
 
 fn link(text: &mut String, number: data::Joint, joint: &Joint, place: &Place) {
@@ -133,8 +100,8 @@ fn link(text: &mut String, number: data::Joint, joint: &Joint, place: &Place) {
         column(2),
         column(0),
         names(&[Kind::Mass]).trim_matches(['[', ']']),
-        names(&MOMENT),
-        names(&TENSOR)
+        names(&Kind::OF_BODY[1..4]),
+        names(&Kind::OF_BODY[4..])
     );
 }
 

@@ -1,6 +1,6 @@
 use nalgebra::{Matrix3, Vector3};
 
-use super::recursive::{Body, Place};
+use super::recursive::Place;
 use super::{Inertia, Pose, turn};
 use crate::data;
 use crate::model::ReadyDrive;
@@ -107,20 +107,6 @@ impl Joint {
             }
         };
         self.pose.then(&moved)
-    }
-
-    /// The inertia of its body, part by part.
-    pub fn body_parts(&self) -> Body<f64> {
-        let Inertia {
-            mass,
-            moment,
-            tensor,
-        } = self.inertia;
-        Body {
-            mass,
-            moment: moment.into(),
-            tensor: [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|at| tensor[at]),
-        }
     }
 }
 

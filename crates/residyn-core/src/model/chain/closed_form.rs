@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use super::base::{Base, base_parameters};
 use super::body::{Chain, Joint};
-use super::equations::{Kind, Lengths, columns};
+use super::equations::{Column, Kind, Lengths, columns};
 use super::formula::{factors, join, number, sum};
-use super::model_file::{name, quoted, short, unit};
-use super::series::{Series, rounded};
+use super::model_file::{gravity_parameter, name, parameter, short};
+use super::series::Series;
 use crate::data;
 
 /// Formulas longer than this many characters are broken into lines.
@@ -71,26 +71,13 @@ impl<'c> ClosedForm<'c> {
 
     fn parameters(&self) -> String {
         let mut text = "\n[parameters]\n".to_owned();
-        for (base, name) in self.base.iter().zip(&self.names) {
-            let positive = if base.is_positive() {
-                ", positive = true"
-            } else {
-                ""
-            };
-            let _ = writeln!(
-                text,
-                "{name} = {{ value = {:?}, unit = \"{}\"{positive}, about = {} }}",
-                rounded(base.value),
-                unit(base.column.kind),
-                quoted(&about(base, &self.chain.joints[base.column.joint]))
-            );
+        for base in &self.base {
+            let Column { kind, joint, .. } = base.column;
+            let about = about(base, &self.chain.joints[joint]);
+            text += &parameter(kind, joint, base.value, base.is_positive(), &about);
         }
         if self.has_gravity() {
-            let g = self.chain.gravity.norm();
-            let _ = writeln!(
-                text,
-                "g = {{ value = {g:?}, unit = \"m/s^2\", fixed = true }}"
-            );
+            text += &gravity_parameter(self.chain);
         }
         text
     }

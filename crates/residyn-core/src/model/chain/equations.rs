@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::body::Joint;
 use super::series::{Series, Wave};
+use super::spatial::PARTS;
 use crate::data;
 
 /// A vector of functions.
@@ -25,7 +26,7 @@ pub(super) enum Kind {
 }
 
 /// In order of preference, for a link that turns.
-const OF_TURNING: [Kind; 10] = [
+const OF_TURNING: [Kind; PARTS] = [
     Kind::Tensor(2, 2),
     Kind::Moment(0),
     Kind::Moment(1),
@@ -51,8 +52,38 @@ pub(super) struct Column {
 }
 
 impl Kind {
-    /// The kinds that a body has.
-    pub const OF_BODY: [Self; 10] = OF_TURNING;
+    /// The kinds that a body has, in the order of an inertia's parts.
+    pub const OF_BODY: [Self; PARTS] = [
+        Self::Mass,
+        Self::Moment(0),
+        Self::Moment(1),
+        Self::Moment(2),
+        Self::Tensor(0, 0),
+        Self::Tensor(0, 1),
+        Self::Tensor(0, 2),
+        Self::Tensor(1, 1),
+        Self::Tensor(1, 2),
+        Self::Tensor(2, 2),
+    ];
+
+    /// The place of a body's parameter among its parts.
+    ///
+    /// # Panics
+    /// For a rotor's inertia.
+    pub fn place(self) -> usize {
+        let mut kinds = Self::OF_BODY.iter();
+        kinds
+            .position(|kind| *kind == self)
+            .expect("rotors belong to no body")
+    }
+
+    pub fn is_never_negative(self) -> bool {
+        match self {
+            Self::Tensor(a, b) => a == b,
+            Self::Moment(_) => false,
+            Self::Mass | Self::Rotor => true,
+        }
+    }
 
     /// `zz`, `mx`, `m`, `J`.
     pub fn stem(self) -> String {

@@ -123,7 +123,31 @@ pub(super) fn quoted(text: &str) -> String {
     toml_edit::Value::from(text).to_string()
 }
 
-pub(super) fn unit(kind: Kind) -> &'static str {
+/// The line that declares a parameter of a joint's body.
+pub(super) fn parameter(
+    kind: Kind,
+    joint: data::Joint,
+    value: f64,
+    is_positive: bool,
+    about: &str,
+) -> String {
+    format!(
+        "{} = {{ value = {:?}, unit = \"{}\"{}, about = {} }}\n",
+        name(kind, joint),
+        rounded(value),
+        unit(kind),
+        if is_positive { ", positive = true" } else { "" },
+        quoted(about)
+    )
+}
+
+/// The line that declares gravity.
+pub(super) fn gravity_parameter(chain: &Chain) -> String {
+    let g = chain.gravity.norm();
+    format!("g = {{ value = {g:?}, unit = \"m/s^2\", fixed = true }}\n")
+}
+
+fn unit(kind: Kind) -> &'static str {
     match kind {
         Kind::Tensor(..) | Kind::Rotor => "kg m^2",
         Kind::Moment(_) => "kg m",

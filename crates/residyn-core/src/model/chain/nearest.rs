@@ -1,16 +1,13 @@
 //! The bodies nearest to given ones, subject to given sums of their parameters.
 //!
-//! A body is possible if its pseudo-inertia, the matrix of the second moments of its mass over (x, y, z, 1), is
-//! positive definite. The distance between two bodies is the log-determinant Bregman divergence of these matrices,
-//! which does not depend on frames or units and grows without bound towards impossible bodies (Lee, Wensing and Park,
-//! Geometric robot dynamic identification, 2020).
+//! How near a body is to another is their [`Divergence`], which grows without bound towards impossible bodies.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Vector3};
+use nalgebra::{DMatrix, DVector};
 
-use super::spatial::Inertia;
+use super::pseudo_inertia::{Divergence, is_physical};
+use super::spatial::{PARTS, Parts};
 
-/// A weighted sum of body parts, each with its factor and index: ten parts per body, in the order of
-/// [`Inertia::of_parts`].
+/// A weighted sum of body parts, each with its factor and its index among the parts of all bodies.
 pub(super) struct Sum {
     pub parts: Vec<(f64, usize)>,
     pub value: f64,
@@ -23,41 +20,30 @@ const THICKNESS: f64 = 1e-6;
 /// Squared length of the last step, in the metric of the divergence.
 const CONVERGED: f64 = 1e-20;
 
-/// The parts of the bodies nearest to `bodies` that have these sums; none if there are no such bodies.
-pub(super) fn nearest(bodies: &[[f64; 10]], sums: &[Sum]) -> Option<Vec<[f64; 10]>> {
-    let is_body: Vec<bool> = bodies.iter().map(|parts| parts[0] > 0.0).collect();
-    let start: Vec<Matrix4<f64>> = bodies
-        .iter()
-        .map(|parts| thickened(pseudo(parts)))
-        .collect();
-    let inverse = |matrix: &Matrix4<f64>| matrix.cholesky().map(|factors| factors.inverse());
-    let declared: Vec<Matrix4<f64>> = (start.iter().zip(&is_body))
-        .map(|(matrix, is_body)| {
-            if *is_body {
-                inverse(matrix)
-            } else {
-                Some(Matrix4::zeros())
-            }
+/// The parts of the bodies nearest to `bodies` that have these sums; none if there are no such bodies. A body without mass
+/// has no distance to others: only sums change it.
+pub(super) fn nearest(bodies: &[Parts], sums: &[Sum]) -> Option<Vec<Parts>> {
+    let mut now: Vec<Parts> = bodies.iter().map(thickened).collect();
+    let divergences: Vec<Option<Divergence>> = (now.iter())
+        .map(|parts| match parts[0] > 0.0 {
+            true => Divergence::from_body(parts).map(Some),
+            false => Some(None),
         })
         .collect::<Option<_>>()?;
-    let mut now = bodies.to_vec();
-    for (parts, matrix) in now.iter_mut().zip(&start) {
-        *parts = parts_of(matrix);
-    }
     for _ in 0..STEPS {
-        let (step, length) = newton_step(&now, &declared, &is_body, sums)?;
-        let moved = |share: f64| -> Vec<[f64; 10]> {
-            let each = now.iter().zip(step.chunks_exact(10));
+        let (step, length) = newton_step(&now, &divergences, sums)?;
+        let moved = |share: f64| -> Vec<Parts> {
+            let each = now.iter().zip(step.chunks_exact(PARTS));
             each.map(|(parts, step)| std::array::from_fn(|k| parts[k] + share * step[k]))
                 .collect()
         };
-        let is_possible = |bodies: &[[f64; 10]]| {
-            let mut real = bodies.iter().zip(&is_body).filter(|(_, is_body)| **is_body);
-            real.all(|(parts, _)| pseudo(parts).cholesky().is_some())
+        let are_possible = |moved: &[Parts]| {
+            let mut all = moved.iter().zip(&divergences);
+            all.all(|(parts, divergence)| divergence.is_none() || is_physical(parts))
         };
         let share = std::iter::successors(Some(1.0), |share| Some(0.5 * share))
             .take(40)
-            .find(|share| is_possible(&moved(*share)))?;
+            .find(|share| are_possible(&moved(*share)))?;
         now = moved(share);
         if share == 1.0 && length < CONVERGED {
             return Some(now);
@@ -68,32 +54,29 @@ pub(super) fn nearest(bodies: &[[f64; 10]], sums: &[Sum]) -> Option<Vec<[f64; 10
 
 /// The step to the least divergence under the sums, and its squared length.
 fn newton_step(
-    now: &[[f64; 10]],
-    declared: &[Matrix4<f64>],
-    is_body: &[bool],
+    now: &[Parts],
+    divergences: &[Option<Divergence>],
     sums: &[Sum],
 ) -> Option<(Vec<f64>, f64)> {
-    let (n, m) = (10 * now.len(), sums.len());
+    let (n, m) = (PARTS * now.len(), sums.len());
     let mut system = DMatrix::zeros(n + m, n + m);
     let mut wanted = DVector::zeros(n + m);
-    for (b, parts) in now.iter().enumerate() {
-        if !is_body[b] {
-            (10 * b..10 * b + 10).for_each(|k| system[(k, k)] = 1.0);
-            continue;
-        }
-        let inverse = pseudo(parts).cholesky()?.inverse();
-        let turned: Vec<Matrix4<f64>> = (0..10).map(|k| inverse * pseudo(&unit(k))).collect();
-        for i in 0..10 {
-            wanted[10 * b + i] = turned[i].trace() - (declared[b] * pseudo(&unit(i))).trace();
-            for j in 0..10 {
-                system[(10 * b + i, 10 * b + j)] = (turned[i] * turned[j]).trace();
+    for (b, (parts, divergence)) in now.iter().zip(divergences).enumerate() {
+        let at = PARTS * b;
+        let mut own = system.view_mut((at, at), (PARTS, PARTS));
+        match divergence {
+            None => own.fill_with_identity(),
+            Some(divergence) => {
+                let (gradient, hessian) = divergence.terms(parts)?;
+                own.copy_from(&hessian);
+                wanted.rows_mut(at, PARTS).copy_from(&-gradient);
             }
         }
     }
     for (row, sum) in sums.iter().enumerate() {
         wanted[n + row] = sum.value;
         for (factor, at) in &sum.parts {
-            wanted[n + row] -= factor * now[at / 10][at % 10];
+            wanted[n + row] -= factor * now[at / PARTS][at % PARTS];
             system[(n + row, *at)] = *factor;
             system[(*at, n + row)] = *factor;
         }
@@ -127,65 +110,25 @@ fn equilibrated(mut system: DMatrix<f64>, mut wanted: DVector<f64>) -> Option<DV
     Some(solution)
 }
 
-fn unit(k: usize) -> [f64; 10] {
-    std::array::from_fn(|other| if other == k { 1.0 } else { 0.0 })
-}
-
-/// Second moments of the mass over (x, y, z, 1).
-fn pseudo(parts: &[f64; 10]) -> Matrix4<f64> {
-    let Inertia {
-        mass,
-        moment,
-        tensor,
-    } = Inertia::of_parts(parts);
-    let spread = Matrix3::identity() * (0.5 * tensor.trace()) - tensor;
-    let mut all = Matrix4::zeros();
-    all.fixed_view_mut::<3, 3>(0, 0).copy_from(&spread);
-    all.fixed_view_mut::<3, 1>(0, 3).copy_from(&moment);
-    all.fixed_view_mut::<1, 3>(3, 0)
-        .copy_from(&moment.transpose());
-    all[(3, 3)] = mass;
-    all
-}
-
-/// The parts of the body with these second moments.
-fn parts_of(moments: &Matrix4<f64>) -> [f64; 10] {
-    let spread: Matrix3<f64> = moments.fixed_view::<3, 3>(0, 0).into();
-    let moment: Vector3<f64> = moments.fixed_view::<3, 1>(0, 3).into();
-    let t = Matrix3::identity() * spread.trace() - spread;
-    let [x, y, z] = moment.into();
-    [
-        moments[(3, 3)],
-        x,
-        y,
-        z,
-        t[(0, 0)],
-        t[(0, 1)],
-        t[(0, 2)],
-        t[(1, 1)],
-        t[(1, 2)],
-        t[(2, 2)],
-    ]
-}
-
-/// The moments of a body that has some extent along every axis.
-fn thickened(mut moments: Matrix4<f64>) -> Matrix4<f64> {
-    if moments.cholesky().is_none() {
-        let size = moments
-            .fixed_view::<3, 3>(0, 0)
-            .trace()
-            .max(THICKNESS * moments[(3, 3)]);
-        (0..3).for_each(|k| moments[(k, k)] += THICKNESS * size);
+/// A body with mass, with some extent along every axis.
+fn thickened(parts: &Parts) -> Parts {
+    let [mass, .., xx, _, _, yy, _, zz] = *parts;
+    let mut thick = *parts;
+    if mass > 0.0 && !is_physical(parts) {
+        let size = (0.5 * (xx + yy + zz)).max(THICKNESS * mass);
+        for k in [4, 7, 9] {
+            thick[k] += 2.0 * THICKNESS * size;
+        }
     }
-    moments
+    thick
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Sum, nearest, pseudo};
+    use super::{Parts, Sum, is_physical, nearest};
 
     /// A rod of 1 kg that reaches 0.6 m along z.
-    const ROD: [f64; 10] = [1.0, 0.0, 0.0, 0.3, 0.121, 0.0, 0.0, 0.121, 0.0, 0.002];
+    const ROD: Parts = [1.0, 0.0, 0.0, 0.3, 0.121, 0.0, 0.0, 0.121, 0.0, 0.002];
 
     #[test]
     fn bodies_with_the_same_sums_stay() {
@@ -212,7 +155,7 @@ mod tests {
             "{found:?}"
         );
         assert!(
-            found[0] > 0.4_f64.powi(2) / 0.121 && pseudo(&found).cholesky().is_some(),
+            found[0] > 0.4_f64.powi(2) / 0.121 && is_physical(&found),
             "{found:?}"
         );
     }

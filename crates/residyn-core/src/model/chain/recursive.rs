@@ -8,6 +8,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Pose;
+use super::spatial::PARTS;
 use crate::data::Joint;
 use crate::expr::{Graph, Node, Unary};
 
@@ -78,6 +79,15 @@ struct Wrench {
 }
 
 impl<T> Body<T> {
+    /// From mass, first moments, tensor.
+    pub(super) fn of_parts([mass, x, y, z, xx, xy, xz, yy, yz, zz]: [T; PARTS]) -> Self {
+        Self {
+            mass,
+            moment: [x, y, z],
+            tensor: [xx, xy, xz, yy, yz, zz],
+        }
+    }
+
     /// Mass, first moments, tensor.
     pub fn parts(&self) -> impl Iterator<Item = &T> {
         std::iter::once(&self.mass)

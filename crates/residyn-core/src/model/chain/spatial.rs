@@ -60,6 +60,15 @@ pub fn with_z_along(axis: Vector3<f64>) -> Matrix3<f64> {
     Matrix3::from_columns(&[x, axis.cross(&x), axis])
 }
 
+/// Number of inertial parameters of a body.
+pub(crate) const PARTS: usize = 10;
+
+/// The inertial parameters of a body: mass, first moments, and the [`TENSOR`].
+pub(crate) type Parts = [f64; PARTS];
+
+/// The entries of the inertia tensor among the parts: xx, xy, xz, yy, yz, zz.
+pub(crate) const TENSOR: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+
 /// Mass properties of a rigid body about the origin of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inertia {
@@ -92,6 +101,16 @@ impl Inertia {
             moment: Vector3::new(x, y, z),
             tensor: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
         }
+    }
+
+    /// Mass, first moments, and xx, xy, xz, yy, yz, zz of the tensor.
+    pub(super) fn parts(&self) -> Parts {
+        let tensor = TENSOR.map(|at| self.tensor[at]);
+        std::array::from_fn(|part| match part {
+            0 => self.mass,
+            1..4 => self.moment[part - 1],
+            _ => tensor[part - 4],
+        })
     }
 
     /// A body whose tensor (kg m^2) is given about its centre of mass, in the frame that `pose` puts there.

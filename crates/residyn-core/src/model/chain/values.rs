@@ -8,7 +8,7 @@ use super::closed_form::ClosedForm;
 use super::equations::Kind;
 use super::model_file::is_short;
 use super::nearest::{Sum, nearest};
-use super::spatial::Inertia;
+use super::spatial::{Inertia, PARTS, Parts};
 use crate::data;
 
 /// Why a chain has no bodies for the values of a model.
@@ -40,7 +40,7 @@ pub fn added(
         false => {
             let mut new = now.clone();
             for (name, kind, joint) in Bodies(chain).parameters() {
-                new[joint][place(kind)] = value(&name)?;
+                new[joint][kind.place()] = value(&name)?;
             }
             new
         }
@@ -50,7 +50,7 @@ pub fn added(
             .iter()
             .chain(new)
             .fold(0.0_f64, |most, part| most.max(part.abs()));
-        let added: [f64; 10] = std::array::from_fn(|k| match new[k] - now[k] {
+        let added: Parts = std::array::from_fn(|k| match new[k] - now[k] {
             rounding if rounding.abs() <= ROUNDING * size => 0.0,
             added => added,
         });
@@ -62,22 +62,18 @@ pub fn added(
 /// Differences up to this are rounding, relative to the largest part of a body.
 const ROUNDING: f64 = 1e-13;
 
-/// Mass, first moments and tensor of the body of each joint.
-fn parts_of(chain: &Chain) -> Vec<[f64; 10]> {
-    let parts = |joint: &super::body::Joint| {
-        let mut parts = [0.0; 10];
-        for kind in Kind::OF_BODY {
-            parts[place(kind)] = kind.value(joint);
-        }
-        parts
-    };
-    chain.joints.iter().map(parts).collect()
+/// The parts of the body of each joint.
+fn parts_of(chain: &Chain) -> Vec<Parts> {
+    let joints = chain.joints.iter();
+    joints
+        .map(|joint| Kind::OF_BODY.map(|kind| kind.value(joint)))
+        .collect()
 }
 
 /// The sums that make up the parameters of a short chain. A part that is zero in the file is in no sum and stays zero.
 fn sums(
     chain: &Chain,
-    now: &[[f64; 10]],
+    now: &[Parts],
     value: impl Fn(&str) -> Result<f64, ValuesError>,
 ) -> Result<Vec<Sum>, ValuesError> {
     let closed = ClosedForm::of(chain);
@@ -90,7 +86,7 @@ fn sums(
         let bodies = parts.iter().filter(|part| !is_rotor(part));
         Ok(Sum {
             parts: bodies
-                .map(|(factor, kind, joint)| (*factor, 10 * joint.index() + place(*kind)))
+                .map(|(factor, kind, joint)| (*factor, PARTS * joint.index() + kind.place()))
                 .collect(),
             value: value(name)? - of_rotors,
         })
@@ -103,15 +99,4 @@ fn sums(
     });
     sums.extend(zero);
     Ok(sums)
-}
-
-/// The place of a parameter among the parts of an inertia.
-fn place(kind: Kind) -> usize {
-    match kind {
-        Kind::Mass => 0,
-        Kind::Moment(axis) => 1 + axis,
-        Kind::Tensor(0, b) => 4 + b,
-        Kind::Tensor(a, b) => 5 + a + b,
-        Kind::Rotor => unreachable!("rotors belong to no body"),
-    }
 }

@@ -1,7 +1,7 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::body::{Joint, places};
-use super::recursive::Links;
+use super::recursive::{Body, Links};
 use crate::expr::{Graph, Node, Program};
 
 /// The outermost joint that moves no inertia in some position, if any.
@@ -30,7 +30,7 @@ fn mass_matrix(joints: &[Joint], leaders: &[&Joint]) -> Program {
     let zero = graph.constant(0.0);
     let bodies: Vec<_> = joints
         .iter()
-        .map(|joint| joint.body_parts().map(|part| graph.constant(*part)))
+        .map(|joint| Body::of_parts(joint.inertia.parts().map(|part| graph.constant(part))))
         .collect();
     let mut mass = Links::at(&mut graph, &places(joints), &bodies, [zero; 3], &q).mass();
     for (k, joint) in leaders.iter().enumerate() {
