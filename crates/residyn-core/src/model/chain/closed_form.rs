@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::base::{Base, base_parameters};
 use super::body::{Chain, Joint};
-use super::equations::{Column, Kind, Lengths, columns};
+use super::equations::{Column, Kind, Lengths, christoffel, columns};
 use super::formula::{factors, join, number, sum};
 use super::model_file::{gravity_parameter, name, parameter, short};
 use super::series::Series;
@@ -149,7 +149,10 @@ impl<'c> ClosedForm<'c> {
         let n = self.joints();
         let mut text = String::new();
         for (j, k) in (0..n).flat_map(|j| (j..n).map(move |k| (j, k))) {
-            let symbol = self.sum(|base| self.christoffel(base, i, j, k));
+            let symbol = self.sum(|Base { column, .. }| {
+                let symbol = christoffel(&column.mass, i, j, k);
+                self.lengths.cleaned(column.kind, &[i, j, k], &symbol)
+            });
             if symbol != "0" {
                 join(&mut text, &factors(&symbol, &speeds(j, k)));
             }
@@ -158,15 +161,6 @@ impl<'c> ClosedForm<'c> {
             join(&mut text, &format!("G{}", i + 1));
         }
         if text.is_empty() { "0".into() } else { text }
-    }
-
-    /// The coefficient of qd_j qd_k in equation i per unit of a parameter, both orders of j and k together.
-    fn christoffel(&self, base: &Base, i: usize, j: usize, k: usize) -> Series {
-        let mass = &base.column.mass;
-        let slopes = &mass[i][j].derivative(k) + &mass[i][k].derivative(j);
-        let both = &slopes - &mass[j][k].derivative(i);
-        let symbol = &both * if j == k { 0.5 } else { 1.0 };
-        self.lengths.cleaned(base.column.kind, &[i, j, k], &symbol)
     }
 
     fn energy(&self) -> String {

@@ -147,6 +147,13 @@ pub(super) fn columns(joints: &[Joint], gravity: &Vector3<f64>) -> Vec<Column> {
     columns
 }
 
+/// The coefficient of qd_j qd_k in equation i, both orders of j and k together, for this mass matrix.
+pub(super) fn christoffel(mass: &[Vec<Series>], i: usize, j: usize, k: usize) -> Series {
+    let slopes = &mass[i][j].derivative(k) + &mass[i][k].derivative(j);
+    let both = &slopes - &mass[j][k].derivative(i);
+    &both * if j == k { 0.5 } else { 1.0 }
+}
+
 fn rotor(joints: usize, joint: usize) -> Vec<Vec<Series>> {
     let mut mass = vec![vec![Series::default(); joints]; joints];
     mass[joint][joint] = Series::constant(1.0);

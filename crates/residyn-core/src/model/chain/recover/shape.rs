@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::decomposition::least_squares;
 use crate::model::Dynamics;
+use crate::model::chain::equations::christoffel;
 use crate::model::chain::series::Series;
 
 /// Largest deviation of the equations from those of a mechanism, relative to the largest value of each entry.
@@ -12,71 +13,92 @@ pub(super) const SAME: f64 = 1e-9;
 pub(super) const ROUNDING: f64 = 1e-10;
 pub(super) const KNOWN: &str = "it is not one of the known mechanisms: one joint, two revolute joints in one plane, a revolute joint on a prismatic one";
 
-/// The terms whose weighted sum gives the equations of one kind of mechanism.
+/// The terms whose weighted sum gives the equations of one kind of mechanism, its joints' viscous damping last.
 pub(super) struct Shape {
     joints: usize,
-    parts: Vec<Part>,
+    terms: Vec<Term>,
 }
 
-/// One term of the equations, per unit of its coefficient.
-enum Part {
-    /// In entries of the mass matrix: row, column, function.
-    Mass(Vec<(usize, usize, Series)>),
-    /// In the static forces of joints: joint, function.
-    Force(Vec<(usize, Series)>),
-    /// In the viscous damping of a joint.
-    Damping(usize),
+/// One term of the equations, per unit of its coefficient: its mass matrix, and the potential of its static forces.
+struct Term {
+    mass: Vec<Vec<Series>>,
+    potential: Series,
 }
 
 impl Shape {
     pub fn turning() -> Self {
-        let one = || Series::constant(1.0);
-        let mut parts = vec![Part::Mass(vec![(0, 0, one())])];
-        parts.extend(waves(&[0]).map(|wave| Part::Force(vec![(0, wave)])));
-        Self::new(1, parts)
+        let turning = Self::new(1).with_inertia(&one(), &[(0, 0)]);
+        turning.with_weight(&[0])
     }
 
     pub fn sliding() -> Self {
-        let one = || Series::constant(1.0);
-        let parts = vec![
-            Part::Mass(vec![(0, 0, one())]),
-            Part::Force(vec![(0, one())]),
-        ];
-        Self::new(1, parts)
+        let sliding = Self::new(1).with_inertia(&one(), &[(0, 0)]);
+        sliding.with_potential(Series::coordinate(0))
     }
 
     /// Coefficients: inertia of the first link with the second's mass at the elbow, coupling (two), inertia of the second
     /// link, its rotor, weight of the first link (two) and of the second (two).
     pub fn arm() -> Self {
-        let one = || Series::constant(1.0);
-        let mut parts = vec![Part::Mass(vec![(0, 0, one())])];
-        let coupling = |wave: Series| vec![(0, 0, &wave * 2.0), (0, 1, wave)];
-        parts.extend(waves(&[1]).map(|wave| Part::Mass(coupling(wave))));
-        parts.push(Part::Mass(vec![
-            (0, 0, one()),
-            (0, 1, one()),
-            (1, 1, one()),
-        ]));
-        parts.push(Part::Mass(vec![(1, 1, one())]));
-        parts.extend(waves(&[0]).map(|wave| Part::Force(vec![(0, wave)])));
-        let both = |wave: Series| vec![(0, wave.clone()), (1, wave)];
-        parts.extend(waves(&[0, 1]).map(|wave| Part::Force(both(wave))));
-        Self::new(2, parts)
+        let [cos, sin] = waves(&[1]);
+        let coupled = [(0, 0), (0, 0), (0, 1), (1, 0)];
+        Self::new(2)
+            .with_inertia(&one(), &[(0, 0)])
+            .with_inertia(&cos, &coupled)
+            .with_inertia(&sin, &coupled)
+            .with_inertia(&one(), &[(0, 0), (0, 1), (1, 0), (1, 1)])
+            .with_inertia(&one(), &[(1, 1)])
+            .with_weight(&[0])
+            .with_weight(&[0, 1])
     }
 
+    /// Coefficients: mass of both bodies, coupling (two), inertia of the link, force along the slide, weight of the link
+    /// (two).
     pub fn on_a_slide() -> Self {
-        let one = || Series::constant(1.0);
-        let mut parts = vec![Part::Mass(vec![(0, 0, one())])];
-        parts.extend(waves(&[1]).map(|wave| Part::Mass(vec![(0, 1, wave)])));
-        parts.push(Part::Mass(vec![(1, 1, one())]));
-        parts.push(Part::Force(vec![(0, one())]));
-        parts.extend(waves(&[1]).map(|wave| Part::Force(vec![(1, wave)])));
-        Self::new(2, parts)
+        let [cos, sin] = waves(&[1]);
+        let coupled = [(0, 1), (1, 0)];
+        Self::new(2)
+            .with_inertia(&one(), &[(0, 0)])
+            .with_inertia(&cos, &coupled)
+            .with_inertia(&sin, &coupled)
+            .with_inertia(&one(), &[(1, 1)])
+            .with_potential(Series::coordinate(0))
+            .with_weight(&[1])
     }
 
-    fn new(joints: usize, mut parts: Vec<Part>) -> Self {
-        parts.extend((0..joints).map(Part::Damping));
-        Self { joints, parts }
+    fn new(joints: usize) -> Self {
+        Self {
+            joints,
+            terms: Vec::new(),
+        }
+    }
+
+    /// With a function in these entries of the mass matrix, doubled where an entry is named twice.
+    fn with_inertia(mut self, function: &Series, entries: &[(usize, usize)]) -> Self {
+        let mut mass = self.no_mass();
+        for (i, j) in entries {
+            mass[*i][*j] = &mass[*i][*j] + function;
+        }
+        self.terms.push(Term {
+            mass,
+            potential: Series::default(),
+        });
+        self
+    }
+
+    fn with_potential(mut self, potential: Series) -> Self {
+        let mass = self.no_mass();
+        self.terms.push(Term { mass, potential });
+        self
+    }
+
+    /// With forces that are the cosine and the sine of the sum of these joints' angles.
+    fn with_weight(self, joints: &[usize]) -> Self {
+        let [cos, sin] = waves(joints);
+        self.with_potential(sin).with_potential(-&cos)
+    }
+
+    fn no_mass(&self) -> Vec<Vec<Series>> {
+        vec![vec![Series::default(); self.joints]; self.joints]
     }
 
     /// The damping of each joint, among the coefficients.
@@ -89,31 +111,24 @@ impl Shape {
     /// # Errors
     /// Equations that no coefficients reproduce.
     pub fn fit(&self, declared: &Dynamics) -> Result<Vec<f64>, String> {
-        let n = self.joints;
-        let (mut rows, mut wanted) = (Vec::new(), Vec::new());
-        for (q, qd) in states(n) {
-            let (mass, force) = inverse_dynamics(declared, &q, &qd).ok_or(KNOWN)?;
-            let columns: Vec<_> = self.parts.iter().map(|part| part.at(n, &q, &qd)).collect();
-            rows.push(DMatrix::from_columns(&columns));
-            wanted.push(stacked(&mass, &force));
-        }
+        let states = states(self.joints);
+        let wanted = states.iter().map(|(q, qd)| equations(declared, q, qd));
+        let wanted = wanted.collect::<Option<Vec<_>>>().ok_or(KNOWN)?;
         let sizes = sizes(&wanted);
-        let scaled = |mut matrix: DMatrix<f64>| {
-            for (mut row, size) in matrix.row_iter_mut().zip(&sizes) {
-                row /= *size;
-            }
-            matrix
+        let scaled = |of_states: &[DVector<f64>]| {
+            let scaled = of_states.iter().map(|row| row.component_div(&sizes));
+            DVector::from_vec(scaled.flat_map(|row| row.as_slice().to_vec()).collect())
         };
-        let entries = sizes.len();
-        let mut left = DMatrix::zeros(entries * rows.len(), self.parts.len());
-        let mut right = DVector::zeros(entries * rows.len());
-        for (k, (row, wanted)) in rows.into_iter().zip(&wanted).enumerate() {
-            left.rows_mut(k * entries, entries).copy_from(&scaled(row));
-            let column = DMatrix::from_column_slice(entries, 1, wanted.as_slice());
-            right
-                .rows_mut(k * entries, entries)
-                .copy_from(&scaled(column));
-        }
+        let column = |at: &dyn Fn(&[f64], &[f64]) -> DVector<f64>| {
+            scaled(&states.iter().map(|(q, qd)| at(q, qd)).collect::<Vec<_>>())
+        };
+        let terms = self
+            .terms
+            .iter()
+            .map(|term| column(&|q, qd| term.at(q, qd)));
+        let damping = (0..self.joints).map(|joint| column(&|_, qd| self.damped(joint, qd)));
+        let left = DMatrix::from_columns(&terms.chain(damping).collect::<Vec<_>>());
+        let right = scaled(&wanted);
         let found = least_squares(left.clone(), &right, 1e-12)
             .ok_or("its masses or forces are too small or too large to be distinguished")?;
         let off = (&left * &found - &right).amax();
@@ -124,62 +139,42 @@ impl Shape {
         }
         Ok(found.iter().copied().collect())
     }
+
+    /// The equations of viscous damping of one joint.
+    fn damped(&self, joint: usize, qd: &[f64]) -> DVector<f64> {
+        let n = self.joints;
+        let force = DVector::from_fn(n, |i, _| if i == joint { qd[joint] } else { 0.0 });
+        stacked(&DMatrix::zeros(n, n), &force)
+    }
+}
+
+fn one() -> Series {
+    Series::constant(1.0)
 }
 
 /// cos and sin of the sum of these joints' angles.
-fn waves(joints: &[usize]) -> impl Iterator<Item = Series> {
-    let start = (Series::constant(1.0), Series::default());
-    let (cos, sin) = joints.iter().fold(start, |(c, s), joint| {
+fn waves(joints: &[usize]) -> [Series; 2] {
+    let start = [one(), Series::default()];
+    joints.iter().fold(start, |[c, s], joint| {
         let (c_j, s_j) = (Series::cos(*joint), Series::sin(*joint));
-        (&(&c * &c_j) - &(&s * &s_j), &(&s * &c_j) + &(&c * &s_j))
-    });
-    [cos, sin].into_iter()
+        [&(&c * &c_j) - &(&s * &s_j), &(&s * &c_j) + &(&c * &s_j)]
+    })
 }
 
-impl Part {
-    /// The term's entries of the mass matrix and the forces at a state, stacked.
-    fn at(&self, n: usize, q: &[f64], qd: &[f64]) -> DVector<f64> {
-        let (mut mass, mut force) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        match self {
-            Self::Mass(entries) => {
-                for (i, j, series) in entries {
-                    mass[(*i, *j)] += series.value(q);
-                    if i != j {
-                        mass[(*j, *i)] += series.value(q);
-                    }
-                    add_coriolis(&mut force, (*i, *j), series, q, qd);
-                }
-            }
-            Self::Force(entries) => {
-                entries
-                    .iter()
-                    .for_each(|(i, series)| force[*i] += series.value(q));
-            }
-            Self::Damping(joint) => force[*joint] += qd[*joint],
-        }
+impl Term {
+    /// The equations at a state.
+    fn at(&self, q: &[f64], qd: &[f64]) -> DVector<f64> {
+        let n = q.len();
+        let mass = DMatrix::from_fn(n, n, |i, j| self.mass[i][j].value(q));
+        let pairs = || (0..n).flat_map(|j| (j..n).map(move |k| (j, k)));
+        let force = DVector::from_fn(n, |i, _| {
+            let coriolis = pairs().map(|(j, k)| {
+                let symbol = christoffel(&self.mass, i, j, k);
+                symbol.value(q) * qd[j] * qd[k]
+            });
+            coriolis.sum::<f64>() + self.potential.derivative(i).value(q)
+        });
         stacked(&mass, &force)
-    }
-}
-
-/// Add the Coriolis and centrifugal forces of one entry of M and of its mirror image: dM/dt qd - grad(qd M qd) / 2.
-fn add_coriolis(
-    force: &mut DVector<f64>,
-    (i, j): (usize, usize),
-    series: &Series,
-    q: &[f64],
-    qd: &[f64],
-) {
-    let slopes: Vec<f64> = (0..q.len())
-        .map(|k| series.derivative(k).value(q))
-        .collect();
-    let rate: f64 = slopes.iter().zip(qd).map(|(slope, qd)| slope * qd).sum();
-    let twice = if i == j { 1.0 } else { 2.0 };
-    force[i] += rate * qd[j];
-    if i != j {
-        force[j] += rate * qd[i];
-    }
-    for (force, slope) in force.iter_mut().zip(slopes) {
-        *force -= 0.5 * twice * slope * qd[i] * qd[j];
     }
 }
 
@@ -201,12 +196,8 @@ fn states(n: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
     states
 }
 
-/// Mass matrix and bias forces at a state; none if the mass matrix is singular.
-fn inverse_dynamics(
-    declared: &Dynamics,
-    q: &[f64],
-    qd: &[f64],
-) -> Option<(DMatrix<f64>, DVector<f64>)> {
+/// Mass matrix and bias forces at a state, stacked; none if the mass matrix is singular.
+fn equations(declared: &Dynamics, q: &[f64], qd: &[f64]) -> Option<DVector<f64>> {
     let n = declared.joints;
     let values = declared.values();
     let accelerations = |tau: &DVector<f64>| {
@@ -218,7 +209,8 @@ fn inverse_dynamics(
     let columns: Vec<_> = (0..n).map(|j| accelerations(&unit(j)) - &free).collect();
     let mass = DMatrix::from_columns(&columns).try_inverse()?;
     let force = -(&mass * free);
-    (mass.iter().chain(&force).all(|x| x.is_finite())).then_some((mass, force))
+    let all = stacked(&mass, &force);
+    all.iter().all(|x| x.is_finite()).then_some(all)
 }
 
 fn stacked(mass: &DMatrix<f64>, force: &DVector<f64>) -> DVector<f64> {
@@ -226,19 +218,12 @@ fn stacked(mass: &DMatrix<f64>, force: &DVector<f64>) -> DVector<f64> {
 }
 
 /// The largest magnitude of each entry. Entries that are rounding alone get the overall largest.
-fn sizes(rows: &[DVector<f64>]) -> Vec<f64> {
-    let entries = rows[0].len();
-    let largest = (0..entries).map(|k| rows.iter().map(|row| row[k].abs()).fold(0.0, f64::max));
-    let largest: Vec<f64> = largest.collect();
-    let overall = largest.iter().copied().fold(0.0, f64::max);
-    largest
-        .into_iter()
-        .map(|size| {
-            if size > ROUNDING * overall {
-                size
-            } else {
-                overall
-            }
-        })
-        .collect()
+fn sizes(rows: &[DVector<f64>]) -> DVector<f64> {
+    let none = DVector::zeros(rows[0].len());
+    let largest = rows.iter().fold(none, |most, row| most.sup(&row.abs()));
+    let overall = largest.max();
+    largest.map(|size| match size > ROUNDING * overall {
+        true => size,
+        false => overall,
+    })
 }
