@@ -4,8 +4,11 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use super::ExportModel;
+use super::robot::edit::Edit;
+use super::robot::write_back::Change;
 use super::verify::{Client, ClientError, Predictions, Samples};
-use super::{Change, ExportModel};
+use super::xml::Source;
 use residyn_core::data::Joint;
 use residyn_core::limits::DELAY_STEPS;
 use residyn_core::model::chain::{Chain, model_text};
@@ -44,9 +47,15 @@ pub struct RobotReader {
     pub root: &'static str,
     /// The effects that its joints can hold.
     pub effects: &'static [&'static str],
-    /// The text of a file with changed numbers.
-    pub rewrite: fn(&Path, &[Change]) -> Result<String, FileError>,
+    /// Writes changed numbers into a file.
+    pub(crate) rewrite: Rewrite,
 }
+
+/// Adds the edits to a file that make these changes.
+///
+/// # Errors
+/// A description that lacks what is to be changed, or values that no body can have.
+pub(crate) type Rewrite = fn(&Source<'_>, &mut Edit<'_>, &[Change]) -> Result<(), FileError>;
 
 impl RobotReader {
     /// The model of the chain that ends at the body `tip`, by default at the end of the longest branch, and notes on

@@ -23,7 +23,7 @@ mod xml;
 pub use export_model::{ExportModel, ExportedEffect, ExportedTask};
 pub use format::{ExportError, File, Format, RobotReader};
 pub use json::{Description, ImportError, Imported};
-pub use robot::write_back::{Change, WrittenBack, write_back};
+pub use robot::write_back::{WrittenBack, write_back};
 pub use verify::{Client, ClientError, Difference, Predictions, PythonClient, Samples, rollout_s};
 
 use thiserror::Error;

@@ -1,8 +1,6 @@
 //! Writes values into an existing file and leaves the rest of it unchanged.
 
-use std::path::Path;
-
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
 use super::orientation::WAYS;
@@ -10,28 +8,29 @@ use super::read::{Reader, linear};
 use crate::robot::edit::{Edit, same};
 use crate::robot::mechanism::numbers;
 use crate::robot::write_back::{Change, body, is_some};
-use crate::xml::{self, Source, named};
+use crate::xml::{Source, named};
 use residyn_core::model::FileError;
 use residyn_core::model::chain::{Drivetrain, Inertia};
 
-/// The text of the file at `path` with these changes.
+/// Add the edits that make these changes to the file.
 ///
 /// # Errors
-/// A file that cannot be read, joints without names, or values that no body can have.
-pub fn rewrite(path: &Path, changes: &[Change]) -> Result<String, FileError> {
-    let text = xml::text(path)?;
-    let source = Source::new(path, &text)?;
-    let reader = Reader::new(&source)?;
-    let mut edit = Edit::of(&text);
+/// Joints without names, or values that no body can have.
+pub fn rewrite(
+    source: &Source<'_>,
+    edit: &mut Edit<'_>,
+    changes: &[Change],
+) -> Result<(), FileError> {
+    let reader = Reader::new(source)?;
     for change in changes {
         let joint = reader.joint(&change.joint)?;
-        write_joint(&reader, &mut edit, joint, &change.drivetrain)?;
+        write_joint(&reader, edit, joint, &change.drivetrain)?;
         let body = joint.parent_element();
         if let Some(body) = body.filter(|_| is_some(&change.added)) {
-            write_inertia(&reader, &mut edit, body, &change.added)?;
+            write_inertia(&reader, edit, body, &change.added)?;
         }
     }
-    Ok(edit.finished())
+    Ok(())
 }
 
 fn write_joint<'s>(
@@ -73,35 +72,35 @@ fn write_inertia<'s>(
     let name = of.attribute("name").unwrap_or_default();
     let whole = reader.inertia(of, class, name)?.with(added);
     let (centre, tensor) = body(reader.source, of, &whole)?;
-    let Some(inertial) = named(of, "inertial").next() else {
-        let [pos, mass, full] = [
-            numbers(centre.iter().copied()),
-            numbers([whole.mass]),
-            numbers(entries(&tensor)),
-        ];
-        edit.insert(
-            of,
-            &format!("<inertial pos=\"{pos}\" mass=\"{mass}\" fullinertia=\"{full}\"/>"),
-        );
+    let Some(given) = named(of, "inertial").next() else {
+        edit.insert(of, &inertial(&centre, whole.mass, &tensor));
         return Ok(());
     };
-    edit.set(inertial, "pos", centre.as_slice());
-    edit.set(inertial, "mass", &[whole.mass]);
-    let turn = reader
-        .angles
-        .orientation(&reader.source.element(inertial))?;
+    edit.set(given, "pos", centre.as_slice());
+    edit.set(given, "mass", &[whole.mass]);
+    let turn = reader.angles.orientation(&reader.source.element(given))?;
     let own = turn.transpose() * tensor * turn;
     let beside = own - Matrix3::from_diagonal(&own.diagonal());
-    if inertial.has_attribute("diaginertia") && beside.norm() <= 1e-12 * own.norm() {
-        edit.set(inertial, "diaginertia", own.diagonal().as_slice());
+    if given.has_attribute("diaginertia") && beside.norm() <= 1e-12 * own.norm() {
+        edit.set(given, "diaginertia", own.diagonal().as_slice());
     } else {
         // The axes of a full tensor are those of the body.
         for key in WAYS.into_iter().chain(["diaginertia"]) {
-            edit.remove(inertial, key);
+            edit.remove(given, key);
         }
-        edit.set(inertial, "fullinertia", &entries(&tensor));
+        edit.set(given, "fullinertia", &entries(&tensor));
     }
     Ok(())
+}
+
+/// The element of a body's inertia: its centre of mass, mass, and the tensor about it.
+pub fn inertial(centre: &Vector3<f64>, mass: f64, tensor: &Matrix3<f64>) -> String {
+    format!(
+        "<inertial pos=\"{}\" mass=\"{}\" fullinertia=\"{}\"/>",
+        numbers(centre),
+        numbers([mass]),
+        numbers(entries(tensor))
+    )
 }
 
 /// In the order of `fullinertia`.

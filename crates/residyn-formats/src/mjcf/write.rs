@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::read::read_mjcf;
-use super::rewrite::rewrite;
+use super::rewrite::{inertial, rewrite};
 use crate::robot::mechanism::{
     Drive, Link, Mechanism, file, friction_widths, head, numbers, option,
 };
@@ -79,27 +79,11 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
 
 /// A body, its element left open for the next.
 fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String {
-    let rotation = link.pose.rotation;
-    let axes = rotation
-        .column(0)
-        .iter()
-        .chain(rotation.column(1).iter())
-        .copied()
-        .collect::<Vec<_>>();
-    let t = link.tensor;
-    let tensor = [
-        t[(0, 0)],
-        t[(1, 1)],
-        t[(2, 2)],
-        t[(0, 1)],
-        t[(0, 2)],
-        t[(1, 2)],
-    ];
     let end = next.map_or(link.centre, |next| next.pose.origin);
     let shape = match end.norm() {
         0.0 => "type=\"sphere\" size=\"0.04\"".to_owned(),
         length => {
-            let ends = numbers([0.0; 3].into_iter().chain(end.iter().copied()));
+            let ends = numbers([0.0; 3].iter().chain(&end));
             format!(
                 "type=\"capsule\" size=\"{}\" fromto=\"{ends}\"",
                 numbers([0.05 * length])
@@ -109,18 +93,16 @@ fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String
     format!(
         "{indent}<body name=\"{}\" pos=\"{}\" xyaxes=\"{}\">\n\
          {indent}  <joint name=\"{}\" type=\"{}\" axis=\"{}\"{}/>\n\
-         {indent}  <inertial pos=\"{}\" mass=\"{}\" fullinertia=\"{}\"/>\n\
+         {indent}  {}\n\
          {indent}  <geom {shape} mass=\"0\" contype=\"0\" conaffinity=\"0\"/>\n",
         joint.body,
-        numbers(link.pose.origin.iter().copied()),
-        numbers(axes),
+        numbers(&link.pose.origin),
+        numbers(link.pose.rotation.columns(0, 2).iter()),
         joint.name,
         if joint.slides { "slide" } else { "hinge" },
-        numbers(link.axis.iter().copied()),
+        numbers(&link.axis),
         of_joint(joint),
-        numbers(link.centre.iter().copied()),
-        numbers([link.mass]),
-        numbers(tensor),
+        inertial(&link.centre, link.mass, &link.tensor),
     )
 }
 

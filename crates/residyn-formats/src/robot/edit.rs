@@ -22,7 +22,7 @@ impl<'x> Edit<'x> {
 
     /// Give an attribute these numbers, unless it already has them.
     pub fn set(&mut self, node: Node<'_, '_>, key: &str, values: &[f64]) {
-        let new = numbers(values.iter().copied());
+        let new = numbers(values);
         match node.attribute_node(key) {
             Some(given) if holds(given.value(), values) => {}
             Some(given) => self.changes.push((given.range_value(), new)),

@@ -1,7 +1,7 @@
 //! A model as rigid-body simulators can represent it: a mechanism with the same equations, and those effects that their
 //! joints and drives support.
 
-use std::fmt::Write;
+use std::borrow::Borrow;
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
@@ -206,17 +206,13 @@ pub(crate) fn friction_widths(model: &ExportModel) -> String {
 }
 
 /// Numbers to 15 digits, separated by blanks; rounding errors about zero become zero.
-pub(crate) fn numbers(numbers: impl IntoIterator<Item = f64>) -> String {
-    let mut text = String::new();
-    for number in numbers {
-        let number = if number.abs() < 1e-15 {
-            0.0
-        } else {
-            rounded(number)
-        };
-        let _ = write!(text, "{}{number}", if text.is_empty() { "" } else { " " });
-    }
-    text
+pub(crate) fn numbers(numbers: impl IntoIterator<Item = impl Borrow<f64>>) -> String {
+    let text = |number: &f64| match number.abs() < 1e-15 {
+        true => "0".to_owned(),
+        false => rounded(*number).to_string(),
+    };
+    let texts = numbers.into_iter().map(|number| text(number.borrow()));
+    texts.collect::<Vec<_>>().join(" ")
 }
 
 /// Gravity, step and integrator of the model, for MuJoCo.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use roxmltree::Node;
 
-use super::edit::same;
+use super::edit::{Edit, same};
 use crate::xml::Source;
 use crate::{FORMATS, Format, xml};
 use residyn_core::data::Joint;
@@ -15,7 +15,7 @@ use residyn_core::model::{FileError, FileRemedy, FittedEffect, Library, Model};
 
 /// A model's changes to a joint of the description and to the body that it moves.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub(crate) struct Change {
     /// The joint, as the file names it.
     pub joint: String,
     /// Only damping, friction and armature differ from the file's.
@@ -47,7 +47,9 @@ const ROUNDING: f64 = 1e-9;
 /// A file that cannot be read, has an unknown format, or is not the one that the model was made from: other joints,
 /// parameters or equations; values that no body can have.
 pub fn write_back(model: &Model, file: &Path, tip: Option<&str>) -> Result<WrittenBack, FileError> {
-    let format = format(file)?;
+    let text = xml::text(file)?;
+    let source = Source::new(file, &text)?;
+    let format = format(&source)?;
     let robots = format.robots.as_ref().expect("it was found by what it has");
     let chain = (robots.read)(file, tip)?;
     let refused = |message: String| FileError::new(file, None, message);
@@ -69,16 +71,16 @@ pub fn write_back(model: &Model, file: &Path, tip: Option<&str>) -> Result<Writt
     })?;
     check_equations(&model, &declared).map_err(refused)?;
     let changes = changes(&model, &declared, &chain, &added);
+    let mut edit = Edit::of(&text);
+    (robots.rewrite)(&source, &mut edit, &changes)?;
     Ok(WrittenBack {
-        text: (robots.rewrite)(file, &changes)?,
+        text: edit.finished(),
         not_carried: not_carried(&model, &declared, robots.effects),
     })
 }
 
 /// The format of a robot description, by its root element.
-fn format(file: &Path) -> Result<&'static Format, FileError> {
-    let text = xml::text(file)?;
-    let source = Source::new(file, &text)?;
+fn format(source: &Source<'_>) -> Result<&'static Format, FileError> {
     let root = source.document_root();
     let is_its = |format: &&&Format| {
         let robots = format.robots.as_ref();

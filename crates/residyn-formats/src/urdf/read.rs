@@ -13,7 +13,7 @@ use residyn_core::model::FileError;
 use residyn_core::model::chain::{Chain, Drivetrain, Inertia, Pose, turn};
 
 /// Gravity, which the format does not contain: m/s^2, against z.
-const GRAVITY: f64 = 9.81;
+pub(super) const GRAVITY: f64 = 9.81;
 
 /// Read the serial chain from the root of a URDF file to the link `tip`, by default to the end of the longest branch.
 /// Gravity acts against z of the root link.

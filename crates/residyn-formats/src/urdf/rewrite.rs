@@ -1,7 +1,5 @@
 //! Writes values into an existing file and leaves the rest of it unchanged.
 
-use std::path::Path;
-
 use nalgebra::Matrix3;
 use roxmltree::Node;
 
@@ -9,27 +7,28 @@ use super::read::Robot;
 use crate::robot::edit::{Edit, same};
 use crate::robot::mechanism::numbers;
 use crate::robot::write_back::{Change, body, is_some};
-use crate::xml::{self, Source, named};
+use crate::xml::{Source, named};
 use residyn_core::model::FileError;
 use residyn_core::model::chain::{Drivetrain, Inertia};
 
-/// The text of the file at `path` with these changes.
+/// Add the edits that make these changes to the file.
 ///
 /// # Errors
-/// A file that cannot be read, or values that no body can have.
-pub fn rewrite(path: &Path, changes: &[Change]) -> Result<String, FileError> {
-    let text = xml::text(path)?;
-    let source = Source::new(path, &text)?;
-    let robot = Robot::new(&source)?;
-    let mut edit = Edit::of(&text);
+/// A joint that is not there, or values that no body can have.
+pub fn rewrite(
+    source: &Source<'_>,
+    edit: &mut Edit<'_>,
+    changes: &[Change],
+) -> Result<(), FileError> {
+    let robot = Robot::new(source)?;
     for change in changes {
         let joint = robot.joint(&change.joint)?;
-        write_dynamics(&source, &mut edit, joint, &change.drivetrain)?;
+        write_dynamics(source, edit, joint, &change.drivetrain)?;
         if is_some(&change.added) {
-            write_inertia(&robot, &mut edit, robot.end(joint, "child")?, &change.added)?;
+            write_inertia(&robot, edit, robot.end(joint, "child")?, &change.added)?;
         }
     }
-    Ok(edit.finished())
+    Ok(())
 }
 
 fn write_dynamics(
@@ -66,17 +65,20 @@ fn write_inertia<'s>(
     let whole = robot.inertia(link)?.with(added);
     let (centre, tensor) = body(robot.source, link, &whole)?;
     let Some(inertial) = named(link, "inertial").next() else {
-        edit.insert(link, &inertial_text(&whole, centre.as_slice(), &tensor));
+        let inertial = format!(
+            "<inertial><origin xyz=\"{}\"/><mass value=\"{}\"/>{}</inertial>",
+            numbers(&centre),
+            numbers([whole.mass]),
+            inertia(&tensor)
+        );
+        edit.insert(link, &inertial);
         return Ok(());
     };
     let part = |name| named(inertial, name).next();
     let turn = robot.pose(inertial)?.rotation;
     match part("origin") {
         Some(origin) => edit.set(origin, "xyz", centre.as_slice()),
-        None => edit.insert(
-            inertial,
-            &format!("<origin xyz=\"{}\"/>", numbers(centre.iter().copied())),
-        ),
+        None => edit.insert(inertial, &format!("<origin xyz=\"{}\"/>", numbers(&centre))),
     }
     if let Some(mass) = part("mass") {
         edit.set(mass, "value", &[whole.mass]);
@@ -101,12 +103,8 @@ fn entries(tensor: &Matrix3<f64>) -> [(&'static str, f64); 6] {
     .map(|(key, a, b)| (key, tensor[(a, b)]))
 }
 
-fn inertial_text(whole: &Inertia, centre: &[f64], tensor: &Matrix3<f64>) -> String {
-    let inertia = entries(tensor).map(|(key, value)| format!(" {key}=\"{}\"", numbers([value])));
-    format!(
-        "<inertial><origin xyz=\"{}\"/><mass value=\"{}\"/><inertia{}/></inertial>",
-        numbers(centre.iter().copied()),
-        numbers([whole.mass]),
-        inertia.concat()
-    )
+/// The element of an inertia tensor.
+pub fn inertia(tensor: &Matrix3<f64>) -> String {
+    let entries = entries(tensor).map(|(key, value)| format!(" {key}=\"{}\"", numbers([value])));
+    format!("<inertia{}/>", entries.concat())
 }

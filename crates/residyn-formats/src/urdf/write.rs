@@ -3,10 +3,10 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Rotation3;
 
-use super::read::read_urdf;
-use super::rewrite::rewrite;
+use super::read::{GRAVITY, read_urdf};
+use super::rewrite::{inertia, rewrite};
 use crate::robot::mechanism::{Link, Mechanism, file, friction_widths, head, numbers, option};
 use crate::verify::{Client, PythonClient};
 use crate::xml::escaped;
@@ -34,8 +34,6 @@ pub(crate) const FORMAT: Format = Format {
     }),
 };
 
-/// Gravity that readers assume, m/s^2.
-const GRAVITY: f64 = 9.81;
 /// Limits that the format requires of sliding joints: m, m/s and N.
 const NO_LIMIT: f64 = 1e6;
 
@@ -98,27 +96,16 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
 }
 
 fn of_link(name: &str, link: &Link) -> String {
-    let t = link.tensor;
-    let entries = [
-        ("xx", 0, 0),
-        ("xy", 0, 1),
-        ("xz", 0, 2),
-        ("yy", 1, 1),
-        ("yz", 1, 2),
-        ("zz", 2, 2),
-    ];
-    let entry = |(key, a, b): (&str, usize, usize)| format!(" i{key}=\"{}\"", numbers([t[(a, b)]]));
-    let inertia: String = entries.into_iter().map(entry).collect();
     format!(
         "  <link name=\"{name}\">\n    <inertial>\n      <origin xyz=\"{}\"/>\n      <mass value=\"{}\"/>\n      \
-         <inertia{inertia}/>\n    </inertial>\n  </link>\n",
-        numbers(link.centre.iter().copied()),
-        numbers([link.mass])
+         {}\n    </inertial>\n  </link>\n",
+        numbers(&link.centre),
+        numbers([link.mass]),
+        inertia(&link.tensor)
     )
 }
 
 fn of_joint(joint: &Joint, link: &Link, parent: &str, limit: Option<f64>) -> String {
-    let xyz = |vector: &Vector3<f64>| numbers(vector.iter().copied());
     let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(link.pose.rotation).euler_angles();
     let mut text = format!(
         "  <joint name=\"{}\" type=\"{}\">\n    <parent link=\"{parent}\"/>\n    <child link=\"{}\"/>\n    \
@@ -130,9 +117,9 @@ fn of_joint(joint: &Joint, link: &Link, parent: &str, limit: Option<f64>) -> Str
             "continuous"
         },
         joint.body,
-        xyz(&link.pose.origin),
+        numbers(&link.pose.origin),
         numbers([roll, pitch, yaw]),
-        xyz(&link.axis),
+        numbers(&link.axis),
         joint.drivetrain.damping,
         joint.drivetrain.friction,
     );
