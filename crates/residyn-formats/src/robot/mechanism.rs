@@ -76,7 +76,8 @@ impl Mechanism {
         }
         let mut found = match model.system.mechanism(&model.equations.values()) {
             Some(chain) => chain,
-            None => recover(&model.declared(), &model.system.prismatic)?,
+            None => recover(&model.declared(), &model.system.prismatic)
+                .map_err(|reason| format!("{reason}; declare its bodies in [chain]"))?,
         };
         if found.joints.iter().any(|joint| joint.follows.is_some()) {
             return Err("one of its links follows the joint of another".into());

@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, Matrix3, Vector3};
 
-use super::shape::{ROUNDING, SAME};
+use super::shape::{ROUNDING, SAME, beyond_rounding};
 use crate::model::chain::spatial::with_z_along;
 use crate::model::chain::{Drivetrain, Inertia, Joint, Pose};
 
@@ -48,14 +48,7 @@ pub(super) fn sliding(found: &[f64], gravity: f64) -> Result<Links, String> {
 fn inclined(mass: f64, force: f64, gravity: f64) -> Planar {
     let along = -force / mass;
     let across = (gravity.powi(2) - along.powi(2)).max(0.0).sqrt();
-    Planar::new(
-        -across,
-        if along.abs() > ROUNDING * gravity {
-            along
-        } else {
-            0.0
-        },
-    )
+    Planar::new(-across, beyond_rounding(along, gravity))
 }
 
 /// Two links that turn in one plane.
@@ -88,11 +81,7 @@ pub(super) fn arm(found: &[f64], gravity: f64) -> Result<Links, String> {
         return Err("the second link has less inertia about its own joint than in the coupling with the first".into());
     }
     let mut outer = joint(2, elbow, link(second, moment_2, mass_2)?);
-    outer.drivetrain.armature = if rotor > ROUNDING * second {
-        rotor
-    } else {
-        0.0
-    };
+    outer.drivetrain.armature = beyond_rounding(rotor, second);
     let inner = joint(
         1,
         Planar::new(0.0, 0.0),
@@ -131,13 +120,7 @@ fn weight(cos: f64, sin: f64, gravity: f64) -> Planar {
 
 /// Drops a component that is rounding relative to the other.
 fn clean(found: Planar) -> Planar {
-    let part = |part: f64| {
-        if part.abs() > ROUNDING * found.norm() {
-            part
-        } else {
-            0.0
-        }
-    };
+    let part = |part: f64| beyond_rounding(part, found.norm());
     Planar::new(part(found.re), part(found.im))
 }
 

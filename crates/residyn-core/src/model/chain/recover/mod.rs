@@ -13,7 +13,7 @@ use super::spatial::turn;
 use super::{Drivetrain, Follows, Inertia, Joint, Place, Pose};
 use crate::model::Dynamics;
 use links::{Build, Planar};
-use shape::{KNOWN, ROUNDING, Shape};
+use shape::{KNOWN, ROUNDING, Shape, beyond_rounding};
 
 /// A mechanism with the same equations of motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,11 +105,7 @@ pub fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recovered, Str
         if *damping < -ROUNDING * largest {
             return Err(format!("{} is driven by its own speed", joint.name));
         }
-        joint.drivetrain.damping = if *damping > ROUNDING * largest {
-            *damping
-        } else {
-            0.0
-        };
+        joint.drivetrain.damping = beyond_rounding(*damping, largest);
     }
     Ok(upright(joints, downward, gravity))
 }

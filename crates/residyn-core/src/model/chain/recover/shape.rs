@@ -11,7 +11,17 @@ use crate::model::chain::series::Series;
 pub(super) const SAME: f64 = 1e-9;
 /// A number below this share of what it is added to is rounding.
 pub(super) const ROUNDING: f64 = 1e-10;
+
 pub(super) const KNOWN: &str = "it is not one of the known mechanisms: one joint, two revolute joints in one plane, a revolute joint on a prismatic one";
+
+/// A number; 0 if it is rounding next to this size.
+pub(super) fn beyond_rounding(number: f64, size: f64) -> f64 {
+    if number.abs() > ROUNDING * size {
+        number
+    } else {
+        0.0
+    }
+}
 
 /// The terms whose weighted sum gives the equations of one kind of mechanism, its joints' viscous damping last.
 pub(super) struct Shape {
