@@ -7,6 +7,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 
 use super::servo::{Servo, servos};
+use super::value;
 use crate::xml::escaped;
 use crate::{ExportError, ExportModel, ExportedEffect, File};
 use residyn_core::model::chain::{Joint, Pose, Spring, recover, rounded};
@@ -120,12 +121,7 @@ impl Mechanism {
 
     fn carry(&mut self, effect: &ExportedEffect, model: &ExportModel) {
         let parameters = &model.equations.parameters;
-        let value = |name: &String| {
-            parameters
-                .iter()
-                .find(|p| p.name == *name)
-                .map_or(0.0, |p| p.value)
-        };
+        let value = |name: &String| value(parameters, name).unwrap_or(0.0);
         let values: Vec<f64> = effect.parameters.iter().map(value).collect();
         let (joints, drives) = (&mut self.joints, &mut self.drives);
         let (joint, drive) = (&mut joints[effect.joint], &mut drives[effect.joint]);

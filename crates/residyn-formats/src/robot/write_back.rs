@@ -5,6 +5,7 @@ use std::path::Path;
 use roxmltree::Node;
 
 use super::edit::{Edit, same};
+use super::value;
 use crate::xml::Source;
 use crate::{FORMATS, Format, xml};
 use residyn_core::data::Joint;
@@ -58,13 +59,7 @@ pub fn write_back(model: &Model, file: &Path, tip: Option<&str>) -> Result<Writt
     check_joints(&model, &chain).map_err(of_other_file)?;
     let library = Library::built_in();
     let declared = Model::from_text(file, &model_text(&chain), library.effects())?;
-    let value = |name: &str| {
-        model
-            .parameters
-            .iter()
-            .find(|p| p.name == name)
-            .map(|p| p.value)
-    };
+    let value = |name: &str| value(&model.parameters, name);
     let added = added(&chain, value).map_err(|error| match error {
         ValuesError::Missing(_) => of_other_file(error.to_string()),
         ValuesError::NoBodies => refused(error.to_string()),
@@ -119,14 +114,8 @@ fn check_joints(model: &Model, chain: &Chain) -> Result<(), String> {
 fn check_equations(model: &Model, declared: &Model) -> Result<(), String> {
     let bare = |model: &Model| model.without_drive().with_effects(Vec::new()).dynamics();
     let [own, of_file] = [model, declared].map(bare);
-    let value = |name: &str| {
-        own.parameters
-            .iter()
-            .find(|p| p.name == name)
-            .map(|p| p.value)
-    };
     let values: Vec<f64> = (of_file.parameters.iter())
-        .map(|parameter| value(&parameter.name).unwrap_or(parameter.value))
+        .map(|p| value(&own.parameters, &p.name).unwrap_or(p.value))
         .collect();
     let n = model.joints;
     let differs = (0..10).any(|point| {
