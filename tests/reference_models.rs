@@ -176,7 +176,7 @@ mod slow {
         assert_eq!(c_i["declared"], 9.2);
         assert!((c_i["value"].as_f64().unwrap() - 4.6).abs() < 0.1, "{c_i}");
         let written = fs::read_to_string(out.join("report.md")).unwrap();
-        let line = "- C_i: declared 9.2, fitted 4.";
+        let line = "- `C_i`: declared 9.2, fitted 4.";
         assert!(
             written.contains(line) && written.contains("): 0.50 times as large"),
             "{written}"

@@ -1,10 +1,8 @@
 //! Reports of what closing the loop found, for people and for programs.
 
-mod accuracy;
-mod bodies;
 mod by_log;
 mod calibration;
-mod diagnostics;
+mod document;
 mod effect_curve;
 mod folder;
 mod headline;

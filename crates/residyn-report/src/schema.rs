@@ -162,6 +162,13 @@ pub(super) struct EffectEntry {
     pub not_established: Option<String>,
 }
 
+impl EffectEntry {
+    /// `coulomb_friction on joint 2 (elbow)`
+    pub fn named(&self) -> String {
+        format!("{} on joint {}", self.title, self.place)
+    }
+}
+
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct ParameterEntry {
     pub name: String,

@@ -41,16 +41,6 @@ pub(super) fn reduction(part: f64, quantity: &str) -> String {
     }
 }
 
-/// One text for each value of an effect.
-pub(super) fn values(parameters: &[ParameterEntry]) -> Vec<String> {
-    parameters.iter().map(value).collect()
-}
-
-/// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`
-pub(super) fn value(parameter: &ParameterEntry) -> String {
-    format!("{} = {}", parameter.name, amount(parameter))
-}
-
 /// `0.1598 N m (0.1593 to 0.1603)`; a value that holds in one log alone names the log, and a value at a bound of its
 /// range says so.
 pub(super) fn amount(parameter: &ParameterEntry) -> String {
@@ -80,23 +70,12 @@ pub(super) fn split(method: &SplitMethod) -> String {
     }
 }
 
-/// A p-value.
-pub(super) fn probability(p: f64) -> String {
-    if p < 1e-12 {
-        "< 1e-12".to_owned()
-    } else if p < 1e-3 {
-        format!("{p:.0e}")
-    } else {
-        format!("{p:.3}")
-    }
-}
-
 /// `p = 0.031`, `p < 1e-12`
 pub(super) fn p_value(p: f64) -> String {
-    let number = probability(p);
-    match number.starts_with('<') {
-        true => format!("p {number}"),
-        false => format!("p = {number}"),
+    match p {
+        p if p < 1e-12 => "p < 1e-12".to_owned(),
+        p if p < 1e-3 => format!("p = {p:.0e}"),
+        p => format!("p = {p:.3}"),
     }
 }
 

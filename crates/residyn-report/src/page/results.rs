@@ -7,7 +7,9 @@ use pulldown_cmark::html::push_html;
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 use serde_json::Value;
 
-use super::{Section, framed, made};
+use super::blocks::percent;
+use super::framed;
+use crate::document::{Block, Document, Section, of_call};
 use crate::json::PAGE;
 use crate::wording::capitalised;
 use residyn_core::model::Call;
@@ -44,25 +46,28 @@ impl ResultsPage<'_> {
     }
 
     fn html(&self) -> String {
-        let sections = [
-            Section {
-                id: "came",
-                question: "What came out?",
-                answer: html! { (shown(self)) (markdown(self.text)) },
-            },
-            made::of_results(self),
-        ];
-        let head = html! {
-            p.system { (self.what) }
-            h1 { (capitalised(self.headline)) }
+        let answer = Block::Drawn {
+            page: html! { (shown(self)) (markdown(self.text)) },
+            files: &[],
         };
-        let title = format!("{}: {}", self.what, self.headline);
-        framed(&title, &head, &sections, &html! {})
+        let document = Document {
+            about: self.what.to_owned(),
+            headline: capitalised(self.headline),
+            head: Vec::new(),
+            sections: vec![
+                Section {
+                    id: "came",
+                    question: "What came out?",
+                    answer: vec![answer],
+                },
+                of_call(self.call, self.seed, self.configuration),
+            ],
+        };
+        framed(&document, &html! {})
     }
 }
 
 fn shown(results: &ResultsPage<'_>) -> Markup {
-    let percent = |share: f64| format!("{:.1}%", 100.0 * share.clamp(0.0, 1.0));
     html! {
         @if let Some(figure) = results.figure { div.figure tabindex="0" { (PreEscaped(figure)) } }
         @if !results.shares.is_empty() {

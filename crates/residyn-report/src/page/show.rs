@@ -2,29 +2,25 @@
 
 use maud::{Markup, html};
 
-use super::Section;
 use super::motion::motion;
 use crate::plot_data::{ScatterEntry, SegmentEntry};
 use crate::schema::Report;
 
-pub(super) fn section(report: &Report) -> Section {
+/// All pictures of a report.
+pub(crate) fn pictures(report: &Report) -> Markup {
     let shown = &report.plots;
-    Section {
-        id: "show",
-        question: "Show me",
-        answer: html! {
-            p.small.screen { "Drag over a curve to zoom in, double-click to see all of it; on the keyboard + and \u{2212} zoom, "
-                "arrows move, 0 shows all." }
-            @if let Some(shown) = &shown.motion { (motion(shown)) }
-            @for (k, segment) in shown.segments.iter().enumerate() { (curves(k, segment)) }
-            @if !shown.residuals.is_empty() {
-                h3 { "Residual force: what each model leaves unexplained" }
-                p.small { "A point is the force that a short segment of motion needs in addition to the model's. The line is what the effects add by "
-                    "their formulas, with the band of their intervals; if effects depend on more than that, it is the mean of what all of "
-                    "them explain." }
-                @for (k, scatter) in shown.residuals.iter().enumerate() { (scatters(report, k, scatter)) }
-            }
-        },
+    html! {
+        p.small.screen { "Drag over a curve to zoom in, double-click to see all of it; on the keyboard + and \u{2212} zoom, "
+            "arrows move, 0 shows all." }
+        @if let Some(shown) = &shown.motion { (motion(shown)) }
+        @for (k, segment) in shown.segments.iter().enumerate() { (curves(k, segment)) }
+        @if !shown.residuals.is_empty() {
+            h3 { "Residual force: what each model leaves unexplained" }
+            p.small { "A point is the force that a short segment of motion needs in addition to the model's. The line is what the effects add by "
+                "their formulas, with the band of their intervals; if effects depend on more than that, it is the mean of what all of "
+                "them explain." }
+            @for (k, scatter) in shown.residuals.iter().enumerate() { (scatters(report, k, scatter)) }
+        }
     }
 }
 

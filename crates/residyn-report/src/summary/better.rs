@@ -1,7 +1,7 @@
 //! How much better: errors on the test logs, one row per joint.
 
 use super::{listed, paragraph};
-use crate::accuracy::{fitted_tests, is_some_reduction, position_unit};
+use crate::document::{fitted_tests, position_unit, removed};
 use crate::schema::{ModelError, Report, TorqueEntry};
 use crate::wording::{WITH_FRICTION, small};
 use residyn_core::closeloop::ErrorModel;
@@ -28,13 +28,7 @@ fn table(title: &str, rows: Vec<String>, reduction: Option<[f64; 2]>) -> Vec<Str
         "",
         ["as written", "fitted", "with effects"].map(str::to_owned),
     );
-    let removed = reduction.filter(is_some_reduction).map(|[low, high]| {
-        format!(
-            "  the effects remove {:.0} to {:.0} % of the fitted model's error (95 % interval)",
-            100.0 * low,
-            100.0 * high
-        )
-    });
+    let removed = removed(reduction, "error").map(|removed| format!("  {removed}"));
     let title = format!("How much better is it? {title}");
     [vec![title, heads], rows, removed.into_iter().collect()].concat()
 }

@@ -7,9 +7,9 @@ mod trust;
 
 use std::path::Path;
 
+use super::document::values;
 use super::json::PAGE;
 use super::schema::{EffectEntry, Report};
-use super::wording::values;
 use residyn_core::closeloop::Stage;
 use residyn_core::data::Remedy;
 use residyn_core::layout::wrap;
@@ -87,15 +87,14 @@ fn missing(report: &Report) -> Vec<String> {
     if report.effects.is_empty() {
         return Vec::new();
     }
-    let sizes = |effect: &EffectEntry| values(&effect.parameters).join(", ");
-    let named = |effect: &EffectEntry| format!("{} on joint {}", effect.title, effect.place);
+    let sizes = |effect: &EffectEntry| values(&effect.parameters).replace('`', "");
     let whole = report.effects.iter().flat_map(|effect| {
-        let added = format!("{}: {}", named(effect), effect.expression);
+        let added = format!("{}: {}", effect.named(), effect.expression);
         [paragraph("  ", &added), paragraph("    ", &sizes(effect))].concat()
     });
     let mut lines: Vec<String> = whole.collect();
     if report.effects.len() > 1 && lines.len() > EFFECTS {
-        let one = |effect: &EffectEntry| format!("{}: {}", named(effect), sizes(effect));
+        let one = |effect: &EffectEntry| format!("{}: {}", effect.named(), sizes(effect));
         let each = report.effects.iter().map(one).collect();
         let first = listed(each, EFFECTS, "effects");
         lines = first

@@ -1,8 +1,7 @@
 //! Whether the answer can be trusted, in a few lines.
 
 use super::paragraph;
-use crate::calibration;
-use crate::diagnostics::{proposal_line, structure};
+use crate::document::{alarms, proposal_line, structure};
 use crate::schema::{EffectEntry, Report};
 
 /// Most remarks besides the residual.
@@ -31,14 +30,7 @@ pub(super) fn lines(report: &Report) -> Vec<String> {
 fn harmful(report: &Report) -> Option<String> {
     let raise = |effect: &EffectEntry| {
         let rise = -effect.error_reduction?;
-        let message = || {
-            format!(
-                "{} on joint {} (by {:.0} %)",
-                effect.title,
-                effect.place,
-                100.0 * rise
-            )
-        };
+        let message = || format!("{} (by {:.0} %)", effect.named(), 100.0 * rise);
         (rise > 0.01).then(message)
     };
     let effects: Vec<String> = report.effects.iter().filter_map(raise).collect();
@@ -47,7 +39,12 @@ fn harmful(report: &Report) -> Option<String> {
 }
 
 fn calibrated(report: &Report) -> Option<String> {
-    report.calibration.as_ref().map(calibration::line)
+    let found = report.calibration.as_ref()?;
+    Some(format!(
+        "{} simulations of the accepted model: {}",
+        found.runs,
+        alarms(found)
+    ))
 }
 
 fn held(report: &Report) -> Option<String> {
@@ -70,9 +67,7 @@ fn rivals(report: &Report) -> Option<String> {
 
 fn supported(report: &Report) -> Option<String> {
     let effects = report.supported.iter();
-    let effects: Vec<String> = effects
-        .map(|effect| format!("{} on joint {}", effect.title, effect.place))
-        .collect();
+    let effects: Vec<String> = effects.map(EffectEntry::named).collect();
     (!effects.is_empty()).then(|| format!("in the model, not established: {}", effects.join(", ")))
 }
 

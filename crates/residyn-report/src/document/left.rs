@@ -1,11 +1,12 @@
-//! The section of `report.md` on what the effects leave unexplained.
+//! What the effects leave unexplained.
 
-use super::schema::Report;
-use super::wording::{FITTED, WITH_EFFECTS, capitalised, p_value};
+use super::{Block, folded, heading, paragraph, paragraphs};
+use crate::schema::Report;
+use crate::wording::{FITTED, WITH_EFFECTS, p_value};
 use residyn_core::closeloop::{Proposal, UNKNOWN};
 
 /// What is left of the residuals, and a formula for it.
-pub(super) fn diagnostics(report: &Report) -> String {
+pub(super) fn left(report: &Report) -> Vec<Block> {
     let norm = &report.residual_norm;
     let force = |value: Option<f64>| match value {
         Some(value) => format!("{value:.4}"),
@@ -14,24 +15,21 @@ pub(super) fn diagnostics(report: &Report) -> String {
             norm.failure.as_deref().unwrap_or_default()
         ),
     };
-    format!(
-        "## What is left\n\n{}\n{}\
-         Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over blocks of {} s in \
-         N m or N.\n\n\
-         ![residual](residual.svg)\n\n{}",
-        structure(report),
-        network(report),
+    let size = format!(
+        "Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over blocks of {} s in N m or N.",
         force(norm.before),
         force(norm.after),
-        report.settings.diagnostics.block_s,
-        (report.unexplained.proposal.as_ref())
-            .map(proposed)
-            .unwrap_or_default()
-    )
+        report.settings.diagnostics.block_s
+    );
+    let said = [Some(structure(report)), network(report), Some(size)];
+    let said = paragraphs(said.into_iter().flatten());
+    let proposal = report.unexplained.proposal.as_ref().map(proposed);
+    let title = vec![heading("What is left")];
+    [title, said, Vec::from_iter(proposal)].concat()
 }
 
 /// What the residuals show, in a sentence or two.
-pub(super) fn structure(report: &Report) -> String {
+pub(crate) fn structure(report: &Report) -> String {
     let left = &report.unexplained.left;
     let settings = &report.settings.diagnostics;
     let p = p_value(left.p_value);
@@ -60,29 +58,33 @@ pub(super) fn structure(report: &Report) -> String {
 }
 
 /// Says that no network is used and why, if one was to be trained.
-pub(super) fn network(report: &Report) -> String {
-    let why = match &report.network {
-        None => return String::new(),
-        Some(check) if check.used => return String::new(),
-        Some(check) => match &check.failure {
-            None => "No residual network lowers the error on parts of the training logs that it was not trained on".to_owned(),
-            Some(failure) => format!("The training of a residual network failed ({failure})"),
-        },
+fn network(report: &Report) -> Option<String> {
+    let check = report.network.as_ref().filter(|check| !check.used)?;
+    let why = match &check.failure {
+        None => "No residual network lowers the error on parts of the training logs that it was not trained on".to_owned(),
+        Some(failure) => format!("The training of a residual network failed ({failure})"),
     };
-    format!("{why}: the hybrid model is the one without a network.\n")
+    Some(format!(
+        "{why}: the hybrid model is the one without a network."
+    ))
 }
 
-fn proposed(proposal: &Proposal) -> String {
-    format!(
-        "{}.\nSupported only by its fit. As an effect file, for your own folder of effects:\n\n\
-         ```toml\n{}```\n\n",
-        capitalised(&proposal_line(proposal)),
-        proposal.file
+fn proposed(proposal: &Proposal) -> Block {
+    let about = format!(
+        "Force `{}` removes {:.0} % of the residual on blocks left out of its fit, and is supported only by that fit. As an \
+         effect file, for your own folder of effects:",
+        proposal.formula,
+        100.0 * proposal.explains
+    );
+    let file = Block::Code(proposal.file.clone());
+    folded(
+        format!("A proposal, not a finding, for joint {}", proposal.joint),
+        vec![paragraph(about), file],
     )
 }
 
 /// `proposal, not a finding: force on joint 1 ~ -0.0012 * qd1^3 (explains 81 % of the residual on held-out blocks)`
-pub(super) fn proposal_line(proposal: &Proposal) -> String {
+pub(crate) fn proposal_line(proposal: &Proposal) -> String {
     format!(
         "proposal, not a finding: force on joint {} ~ {} (explains {:.0} % of the residual on held-out blocks)",
         proposal.joint,

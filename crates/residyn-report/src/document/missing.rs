@@ -1,0 +1,94 @@
+//! What is missing: the effects, with the equations that they join.
+
+use super::Block::{self, Boxed, Formula, List, Small};
+use super::{folded, heading, paragraph, value, values};
+use crate::schema::{EffectEntry, Report};
+use crate::wording::{p_value, reduction};
+use residyn_core::closeloop::ErrorModel;
+
+pub(super) fn answer(report: &Report) -> Vec<Block> {
+    let cards = report.effects.iter().map(|effect| card(report, effect));
+    let found = match report.effects.is_empty() {
+        true => paragraph(format!("{}.", report.headline)),
+        false => Boxed("cards", cards.collect()),
+    };
+    let known = [found].into_iter().chain(supported(report));
+    known.chain(equations(report)).collect()
+}
+
+fn card(report: &Report, effect: &EffectEntry) -> Block {
+    let error = match report.compared {
+        ErrorModel::OutputError => "position error on the test logs, at the middle horizon,",
+        ErrorModel::InverseDynamics => "torque error on the test logs",
+    };
+    let evidence = format!(
+        "{}. Share of the {error} that it removes, compared with a refit without it: {}.",
+        p_value(effect.p_value),
+        removed(effect)
+    );
+    let card = vec![
+        Block::Heading(effect.named()),
+        added(effect),
+        Small(effect.enters.clone()),
+        List(effect.parameters.iter().map(value).collect()),
+        Small(evidence),
+    ];
+    Boxed("card", card)
+}
+
+fn added(effect: &EffectEntry) -> Block {
+    match &effect.latex {
+        Some(latex) => Formula {
+            latex: latex.clone(),
+            plain: Some(effect.expression.clone()),
+        },
+        None => paragraph(format!("`{}`", effect.expression)),
+    }
+}
+
+/// The share of the error on the test logs that an effect removes.
+fn removed(effect: &EffectEntry) -> String {
+    match (effect.error_reduction, &effect.error_reduction_failure) {
+        (Some(part), _) => reduction(part, "error"),
+        (None, failure) => format!(
+            "not computed (refit without it: {})",
+            failure.as_deref().unwrap_or_default()
+        ),
+    }
+}
+
+fn supported(report: &Report) -> Option<Block> {
+    let item = |effect: &EffectEntry| {
+        format!(
+            "**{}** on joint {}, {}: {}.",
+            effect.title,
+            effect.place,
+            values(&effect.parameters),
+            effect.not_established.as_deref().unwrap_or_default()
+        )
+    };
+    let effects = &report.supported;
+    (!effects.is_empty()).then(|| {
+        let about = "These lower the loss on blocks left out of the fit and are in the model, but do not rely on their names.";
+        folded(
+            format!("Supported, not established: {}", effects.len()),
+            vec![paragraph(about), List(effects.iter().map(item).collect())],
+        )
+    })
+}
+
+/// The declared equations, then what was added, marked.
+fn equations(report: &Report) -> Vec<Block> {
+    let declared = report.equations.iter().map(|line| Formula {
+        // A row of an `align` environment on its own.
+        latex: line.replace("&=", "="),
+        plain: None,
+    });
+    let with_formula = report.effects.iter().filter(|e| e.latex.is_some());
+    let new = with_formula.map(|effect| {
+        let about = format!("new, {}: {}", effect.enters, effect.named());
+        Boxed("new", vec![Small(about), added(effect)])
+    });
+    let title = [heading("The equations")];
+    title.into_iter().chain(declared).chain(new).collect()
+}

@@ -1,0 +1,178 @@
+//! The report as a document: composed once in the order of a reader's questions, and shown as a page or as Markdown.
+//!
+//! Texts have two marks: `code` between backticks, and **what matters** between double asterisks.
+
+mod better;
+mod bodies;
+mod calibration;
+mod left;
+mod logs;
+mod made;
+mod missing;
+mod next;
+mod trust;
+
+use maud::Markup;
+
+use super::json::PLOTS;
+use super::page;
+use super::schema::{ParameterEntry, Report};
+use super::wording::{amount, capitalised};
+
+pub(super) use better::{fitted_tests, position_unit, removed};
+pub(super) use calibration::alarms;
+pub(super) use left::{proposal_line, structure};
+pub(super) use made::of_call;
+
+pub(super) struct Document {
+    /// What was examined, in a few words.
+    pub about: String,
+    /// The answer in a sentence, without a full stop.
+    pub headline: String,
+    pub head: Vec<Block>,
+    pub sections: Vec<Section>,
+}
+
+/// One section: its name in the list of contents, its question, and the answer.
+pub(super) struct Section {
+    pub id: &'static str,
+    pub question: &'static str,
+    pub answer: Vec<Block>,
+}
+
+#[derive(Clone)]
+pub(super) enum Block {
+    Heading(String),
+    Paragraph(String),
+    Small(String),
+    /// A warning that concerns all of the document.
+    Serious(String),
+    List(Vec<String>),
+    Steps(Vec<String>),
+    Table(Table),
+    Code(String),
+    /// In LaTeX, and as it is written in a model file if it can be.
+    Formula {
+        latex: String,
+        plain: Option<String>,
+    },
+    /// Set apart by a frame or a colour of this name.
+    Boxed(&'static str, Vec<Block>),
+    Folded {
+        about: String,
+        is_open: bool,
+        blocks: Vec<Block>,
+    },
+    /// Ready for a page; a text shows files of the report's folder instead.
+    Drawn {
+        page: Markup,
+        files: &'static [&'static str],
+    },
+}
+
+#[derive(Clone)]
+pub(super) struct Table {
+    pub heads: Vec<String>,
+    pub rows: Vec<Vec<Cell>>,
+    /// Number of columns that name a row.
+    pub labels: usize,
+}
+
+#[derive(Clone, Default)]
+pub(super) struct Cell {
+    pub text: String,
+    /// Its look on a page.
+    pub class: Option<&'static str>,
+    /// What a page says when one points at it.
+    pub hint: Option<String>,
+    /// A share that a page shows as a bar.
+    pub bar: Option<f64>,
+}
+
+pub(super) fn document(report: &Report) -> Document {
+    let pictures = Block::Drawn {
+        page: page::pictures(report),
+        files: &PLOTS,
+    };
+    let section = |id, question, answer| Section {
+        id,
+        question,
+        answer,
+    };
+    Document {
+        about: report.system.clone(),
+        headline: report.headline.clone(),
+        head: head(report),
+        sections: vec![
+            section("missing", "What is missing?", missing::answer(report)),
+            section("better", "How much better is it?", better::answer(report)),
+            section("trust", "Can I trust it?", trust::answer(report)),
+            section("show", "Show me", vec![pictures]),
+            section("next", "What next?", vec![next::steps(report)]),
+            made::section(report),
+        ],
+    }
+}
+
+/// Findings that make results wrong unless they are fixed, then why the answer is as it is.
+fn head(report: &Report) -> Vec<Block> {
+    let serious = report
+        .serious()
+        .map(|(log, finding)| Block::Serious(format!("**{log}**, to be fixed first: {finding}")));
+    let reason = paragraph(format!("{}.", capitalised(&report.reason)));
+    serious.chain([reason]).collect()
+}
+
+fn heading(text: &str) -> Block {
+    Block::Heading(text.to_owned())
+}
+
+fn paragraph(text: impl Into<String>) -> Block {
+    Block::Paragraph(text.into())
+}
+
+fn paragraphs(texts: impl IntoIterator<Item = String>) -> Vec<Block> {
+    texts.into_iter().map(Block::Paragraph).collect()
+}
+
+fn folded(about: impl Into<String>, blocks: Vec<Block>) -> Block {
+    Block::Folded {
+        about: about.into(),
+        is_open: false,
+        blocks,
+    }
+}
+
+/// A table in which the first columns, so many as there are labels, name the rows.
+fn table<H: ToString>(
+    labels: usize,
+    heads: impl IntoIterator<Item = H>,
+    rows: impl IntoIterator<Item = Vec<Cell>>,
+) -> Block {
+    Block::Table(Table {
+        heads: heads.into_iter().map(|head| head.to_string()).collect(),
+        rows: rows.into_iter().collect(),
+        labels,
+    })
+}
+
+fn cell(text: impl ToString) -> Cell {
+    Cell {
+        text: text.to_string(),
+        ..Cell::default()
+    }
+}
+
+fn cells<T: ToString>(texts: impl IntoIterator<Item = T>) -> Vec<Cell> {
+    texts.into_iter().map(cell).collect()
+}
+
+/// `` `F_c1` = 0.1598 N m (0.1593 to 0.1603) ``
+fn value(parameter: &ParameterEntry) -> String {
+    format!("`{}` = {}", parameter.name, amount(parameter))
+}
+
+pub(super) fn values(parameters: &[ParameterEntry]) -> String {
+    let values: Vec<String> = parameters.iter().map(value).collect();
+    values.join(", ")
+}

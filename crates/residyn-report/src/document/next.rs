@@ -1,0 +1,26 @@
+//! What to do next.
+
+use super::Block;
+use crate::schema::Report;
+
+pub(super) fn steps(report: &Report) -> Block {
+    let serious = report.serious().next();
+    let mend = serious
+        .map(|_| "Fix the logs: their serious faults stand at the top of this report.".to_owned());
+    let rivals = report.alternatives.iter().map(|rival| {
+        format!(
+            "To distinguish the finding from **{}** on joint {}: {}.",
+            rival.title, rival.place, rival.experiment
+        )
+    });
+    let model = &report.files.model;
+    let usual = [
+        format!(
+            "Use the model: `{model}` holds the declared equations with fitted values and the effects. `residyn export` writes it \
+             as C, ONNX, FMU, MJCF and more."
+        ),
+        format!("Predict a log that is not among these: `residyn evaluate` takes `{model}`."),
+    ];
+    let steps = mend.into_iter().chain(rivals).chain(usual);
+    Block::Steps(steps.collect())
+}

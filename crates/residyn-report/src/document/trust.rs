@@ -1,0 +1,229 @@
+//! Whether the answer can be trusted: what else explains the logs, what they leave open, and what is wrong with them.
+
+use super::bodies::bodies;
+use super::calibration::calibration;
+use super::left::left;
+use super::logs::by_log;
+use super::{Block, Cell, better, cell, cells, folded, heading, paragraph, table};
+use crate::schema::{
+    AlternativeEntry, AuditEntry, ContradictedEntry, FitEntry, IdentifiabilityEntry, RefittedEntry,
+    Report, TriedEntry,
+};
+use crate::wording::{FITTED, WITH_EFFECTS, amount, listed, reduction, small};
+use residyn_core::data::{Finding, Severity};
+
+pub(super) fn answer(report: &Report) -> Vec<Block> {
+    let calibration = report.calibration.as_ref().map(calibration);
+    let parts = [
+        left(report),
+        alternatives(report),
+        vec![tried(report)],
+        calibration.unwrap_or_default(),
+        parameters(report),
+        by_log(report),
+        contradicted(report),
+        fits(report),
+        findings(report),
+    ];
+    parts.concat()
+}
+
+fn alternatives(report: &Report) -> Vec<Block> {
+    let item = |rival: &AlternativeEntry| {
+        format!(
+            "**{}** on joint {}: {}.",
+            rival.title, rival.place, rival.reason
+        )
+    };
+    let rivals = match report.alternatives.is_empty() {
+        true => paragraph("None of the effects tried explains the logs as well."),
+        false => Block::List(report.alternatives.iter().map(item).collect()),
+    };
+    vec![heading("Other explanations"), rivals]
+}
+
+/// The sets of effects that were fitted, round by round.
+fn tried(report: &Report) -> Block {
+    let about = paragraph("Gain: relative drop of the loss on blocks held out of the fit.");
+    let rounds = report.tried.iter().zip(&report.candidates).zip(1..);
+    let rounds = rounds.flat_map(|((tried, candidates), number)| round(number, *candidates, tried));
+    let blocks = [about].into_iter().chain(rounds);
+    folded("What was tried", blocks.collect())
+}
+
+fn round(number: usize, candidates: usize, tried: &[TriedEntry]) -> Vec<Block> {
+    let round = format!("Round {number} ({candidates} candidates");
+    if tried.is_empty() {
+        let none = "no set came near the loss that the round began with.";
+        return vec![paragraph(format!("{round}): {none}"))];
+    }
+    let row = |tried: &TriedEntry| {
+        let effects: Vec<&str> = tried.effects.iter().map(|e| e.label.as_str()).collect();
+        let chosen = if tried.chosen { "chosen" } else { "" };
+        cells([
+            effects.join(", "),
+            reduction(tried.gain, "loss"),
+            chosen.to_owned(),
+        ])
+    };
+    vec![
+        paragraph(format!("{round}; the most promising sets were fitted):")),
+        table(1, ["effects", "gain", ""], tried.iter().map(row)),
+    ]
+}
+
+/// More parameters than this are folded away.
+const MOST_SHOWN: usize = 12;
+
+fn parameters(report: &Report) -> Vec<Block> {
+    let known = &report.identifiability;
+    let about = format!(
+        "The logs determine {} of {} free parameters of the declared equations.",
+        known.determined, known.free
+    );
+    let heads = [
+        "parameter",
+        "declared",
+        "fitted without the effects",
+        "final",
+        "identifiable",
+    ];
+    let values = Block::Folded {
+        about: "Values with their 95 % intervals".to_owned(),
+        is_open: report.parameters.len() <= MOST_SHOWN,
+        blocks: vec![table(1, heads, report.parameters.iter().map(parameter))],
+    };
+    let held = known.held.iter();
+    let held = held.map(|name| format!("`{name}` is held: {}", why_held(known, name)));
+    let held = (!known.held.is_empty()).then(|| Block::List(held.collect()));
+    let blocks = [heading("Parameters"), paragraph(about), values];
+    (blocks.into_iter().chain(held))
+        .chain(bodies(report))
+        .collect()
+}
+
+fn parameter(one: &RefittedEntry) -> Vec<Cell> {
+    let is_known = one.fitted.identifiable;
+    let texts = [
+        format!("`{}`", one.fitted.name),
+        small(one.declared),
+        small(one.before),
+        amount(&one.fitted),
+        if is_known { "yes" } else { "no" }.to_owned(),
+    ];
+    let look = |text| Cell {
+        class: (!is_known).then_some("doubtful"),
+        ..cell(text)
+    };
+    texts.into_iter().map(look).collect()
+}
+
+/// More parameters than this that trade off against one another are counted, not named.
+const MOST_NAMED: usize = 6;
+
+/// What the logs leave open about a parameter.
+fn why_held(verdict: &IdentifiabilityEntry, name: &str) -> String {
+    let weight = |direction: &&Vec<(String, f64)>| {
+        let own = direction.iter().find(|(other, _)| other == name);
+        own.map_or(0.0, |(_, weight)| weight.abs())
+    };
+    let directions = verdict.undetermined.iter();
+    let direction = directions.max_by(|a, b| weight(a).total_cmp(&weight(b)));
+    let others: Vec<String> = (direction.into_iter().flatten())
+        .filter(|(other, _)| other != name)
+        .map(|(other, _)| format!("`{other}`"))
+        .collect();
+    let with = match others.len() {
+        0 => return "the logs do not determine it, so it stays at its declared value.".to_owned(),
+        1..=MOST_NAMED => listed(&others),
+        _ => format!("{} others", others.len()),
+    };
+    format!(
+        "it trades off against {with}, and the logs determine only their combination. It stays as close to its \
+         declared value as they allow; intervals of the others, and of effects, are conditional on it."
+    )
+}
+
+/// The values in the model file that do not hold for these logs.
+fn contradicted(report: &Report) -> Vec<Block> {
+    if report.contradicted.is_empty() {
+        return Vec::new();
+    }
+    let error = &report.error;
+    let (middle, horizon_s) = error.middle();
+    let [written, fitted] = [&error.declared, &error.before].map(|model| model.of_all(middle));
+    let about = format!(
+        "On the test logs, {horizon_s} s ahead, the position error of the declared model is {} {unit} with the values in its file \
+         and {} {unit} with its parameters fitted to the training logs. These declared values lie outside the 95 % intervals of \
+         the final fit, which includes the effects found:",
+        small(written),
+        small(fitted),
+        unit = better::position_unit(report),
+    );
+    let item = |one: &ContradictedEntry| {
+        format!(
+            "`{}`: declared {}, fitted {}: {}",
+            one.fitted.name,
+            one.declared,
+            amount(&one.fitted),
+            one.comparison
+        )
+    };
+    let advice = "`model.toml` holds the fitted values. If a declared value comes from another log, check that log with `residyn \
+                  audit`; if it comes from a drawing, look for a wrong unit, gear ratio or torque constant.";
+    vec![
+        heading("Declared values that these logs contradict"),
+        paragraph(about),
+        Block::List(report.contradicted.iter().map(item).collect()),
+        paragraph(advice),
+    ]
+}
+
+fn fits(report: &Report) -> Vec<Block> {
+    let fits = &report.fits;
+    let ends = [(FITTED, &fits.before), (WITH_EFFECTS, &fits.after)];
+    let moved: Vec<String> = (fits.moved_to.iter())
+        .map(|(name, value)| format!("`{name}` = {value:.3}"))
+        .collect();
+    let moved = (!moved.is_empty()).then(|| {
+        format!(
+            "With the values in its file the model diverges on these logs: the fit began at {}.",
+            listed(&moved)
+        )
+    });
+    let items = ends.into_iter().map(|(name, fit)| ended(name, fit));
+    let list = Block::List(items.chain(moved).collect());
+    let stopped =
+        (report.stopped).then(|| paragraph("The search was stopped when its time ran out."));
+    let blocks = [heading("Fits"), list];
+    blocks.into_iter().chain(stopped).collect()
+}
+
+fn ended(name: &str, fit: &FitEntry) -> String {
+    let [as_is, scaled] = fit.condition.map(|number| number.unwrap_or(f64::INFINITY));
+    let unfinished = match fit.converged {
+        true => "",
+        false => ", **not converged**",
+    };
+    format!(
+        "{name}: {} ({} steps; condition number {as_is:.1e}, {scaled:.1e} after scaling){unfinished}",
+        fit.termination, fit.steps
+    )
+}
+
+/// What the audit found in each log, except for remarks; logs without findings are left out.
+fn findings(report: &Report) -> Vec<Block> {
+    let of_log = |audit: &AuditEntry| {
+        let matters = |finding: &&Finding| finding.severity != Severity::Info;
+        let findings = audit.findings.iter().filter(matters);
+        let findings: Vec<String> = findings.map(Finding::to_string).collect();
+        let plural = if findings.len() == 1 { "" } else { "s" };
+        let about = format!("{}: {} finding{plural}", audit.log, findings.len());
+        (!findings.is_empty()).then(|| folded(about, vec![Block::List(findings)]))
+    };
+    let mut found: Vec<Block> = report.audit.iter().filter_map(of_log).collect();
+    if found.is_empty() {
+        found.push(paragraph("The audit found nothing to warn about."));
+    }
+    [vec![heading("The logs")], found].concat()
+}
