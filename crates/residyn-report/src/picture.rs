@@ -1,11 +1,12 @@
 //! The report's plots: which parts of an outcome go into which chart.
 
 use super::headline::label;
+use super::plot_data::{Rows, Series, series, windows};
 use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
-use residyn_core::closeloop::{ErrorModel, ForceSample, Needed, Outcome, ResidualForce};
-use residyn_core::data::{Joint, Log};
+use residyn_core::closeloop::{ErrorModel, ForceSample, Outcome, ResidualForce};
+use residyn_core::data::Joint;
 use residyn_core::identify::FitError;
-use residyn_core::sim::metric::{Assessment, NeededTorques, Trace, summarise};
+use residyn_core::sim::metric::{Assessment, summarise};
 use residyn_plot::{
     Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapeModel, ShapePanel,
     ShapeSample, Track,
@@ -16,103 +17,73 @@ const SHOWN_S: f64 = 8.0;
 
 /// What was compared on the beginning of the first test log: open-loop predictions of its motion, or the torques that it needs.
 pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
-    let Some(log) = outcome.given.test.first() else {
-        return Err(PlotError {
-            title: "predictions".into(),
-        });
-    };
-    match outcome.error_model {
-        ErrorModel::OutputError => motion(outcome, log),
-        ErrorModel::InverseDynamics => torques(outcome, log),
-    }
-}
-
-/// Measured motion and open-loop predictions of it.
-fn motion(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
-    let predictions = outcome.predictions.longest.first();
-    let horizon = predictions.map_or(0.0, |predicted| predicted.horizon_s);
-    let mut models: Vec<(Role, &str, &[Trace])> = Vec::new();
-    if let Some(predicted) = predictions {
-        models.push((Role::Before, FITTED, &predicted.before));
-        models.push((Role::After, WITH_EFFECTS, &predicted.after));
-        let network = predicted.hybrid.as_deref();
-        models.extend(network.map(|traces| (Role::Hybrid, WITH_NETWORK, traces)));
-    }
-    let panel = |joint: Joint| Panel {
-        label: label(outcome, joint),
-        quantity: kind(outcome, joint).position(joint),
-        tracks: std::iter::once(measured(log, joint))
-            .chain(models.iter().map(|(role, label, traces)| Track {
-                label: (*label).to_owned(),
-                role: *role,
-                segments: predicted(traces, log, joint),
-            }))
-            .collect(),
+    let all = series(outcome);
+    let shown = all.first();
+    let panel = |joint: Joint| {
+        let kind = kind(outcome, joint);
+        let quantity = match outcome.error_model {
+            ErrorModel::OutputError => kind.position(joint),
+            ErrorModel::InverseDynamics => kind.force(joint),
+        };
+        Panel {
+            label: label(outcome, joint),
+            quantity,
+            tracks: shown.map_or_else(Vec::new, |one| tracks(outcome, one, joint)),
+        }
     };
     let panels: Vec<Panel> = Joint::all(outcome.models.after.model.joints)
         .map(panel)
         .collect();
-    let title = format!(
-        "{}: predictions of {horizon} s, each started from the log",
-        log.name()
-    );
-    residyn_plot::predictions(&panels, &title)
+    let log = shown.map_or_else(|| "the test logs".to_owned(), |one| one.log.name());
+    let about = match (outcome.error_model, outcome.predictions.longest.first()) {
+        (ErrorModel::OutputError, Some(longest)) => format!(
+            "predictions of {} s, each started from the log",
+            longest.horizon_s
+        ),
+        (ErrorModel::OutputError, None) => "no predictions".to_owned(),
+        (ErrorModel::InverseDynamics, _) => "torques that its motion needs".to_owned(),
+    };
+    residyn_plot::predictions(&panels, &format!("{log}: {about}"))
 }
 
-/// Logged torques and those that the motion needs according to the models, both low-passed.
-fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
-    let mut needed: Vec<(Role, &str, &NeededTorques)> = Vec::new();
-    if let Some(Needed { before, after }) = outcome.predictions.torques.first() {
-        needed.extend(before.iter().map(|of| (Role::Before, FITTED, of)));
-        needed.extend(after.iter().map(|of| (Role::After, WITH_EFFECTS, of)));
-    }
-    let curve =
-        |label: &str, role: Role, of: &NeededTorques, values: &[Vec<f64>], joint: Joint| Track {
+/// The curves of a joint; predictions of motion restart with each window.
+fn tracks(outcome: &Outcome, one: &Series<'_>, joint: Joint) -> Vec<Track> {
+    let end_s = one.time[0] + SHOWN_S;
+    let shown = 0..one.time.partition_point(|t| *t <= end_s);
+    let pieces = match outcome.error_model {
+        ErrorModel::OutputError => windows(one),
+        ErrorModel::InverseDynamics => vec![shown.clone()],
+    };
+    let track = |role: Role, label: &str, values: &[f64], pieces: &[Rows]| {
+        let piece = |rows: &Rows| -> Vec<(f64, f64)> {
+            let rows = rows.start..rows.end.min(shown.end);
+            rows.map(|row| (one.time[row], values[row])).collect()
+        };
+        let segments = pieces.iter().map(piece);
+        Track {
             label: label.to_owned(),
             role,
-            segments: vec![beginning(log, &of.time, &values[joint])],
-        };
-    let panel = |joint: Joint| {
-        let logged = needed.first();
-        let logged =
-            logged.map(|(_, _, of)| curve("measured", Role::Measured, of, &of.logged, joint));
-        let models = needed.iter();
-        let models = models.map(|(role, label, of)| curve(label, *role, of, &of.needed, joint));
-        Panel {
-            label: label(outcome, joint),
-            quantity: kind(outcome, joint).force(joint),
-            tracks: logged.into_iter().chain(models).collect(),
+            segments: segments.filter(|piece| piece.len() > 1).collect(),
         }
     };
-    let joints = outcome.models.after.model.joints;
-    let panels: Vec<Panel> = Joint::all(joints).map(panel).collect();
-    let title = format!("{}: torques that its motion needs", log.name());
-    residyn_plot::predictions(&panels, &title)
+    let models = [
+        (Role::Before, FITTED),
+        (Role::After, WITH_EFFECTS),
+        (Role::Hybrid, WITH_NETWORK),
+    ];
+    let measured = std::slice::from_ref(&shown);
+    let measured = track(Role::Measured, "measured", &one.measured[joint], measured);
+    let models = models.into_iter().zip(&one.models);
+    let models = models.map(|((role, label), of)| track(role, label, &of[joint], &pieces));
+    std::iter::once(measured).chain(models).collect()
 }
 
 pub(super) fn kind(outcome: &Outcome, joint: Joint) -> JointKind {
-    JointKind::of(outcome.given.prismatic[joint])
-}
-
-/// The points of a curve along a log that are shown.
-fn beginning(log: &Log, time: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
-    let end = log.time.first().map_or(0.0, |start| start + SHOWN_S);
-    let points = time.iter().copied().zip(values.iter().copied());
-    points.take_while(|(t, _)| *t <= end).collect()
-}
-
-fn measured(log: &Log, joint: Joint) -> Track {
-    Track {
-        label: "measured".into(),
-        role: Role::Measured,
-        segments: vec![beginning(log, &log.time, &log.q[joint])],
+    if outcome.given.prismatic[joint] {
+        JointKind::Prismatic
+    } else {
+        JointKind::Revolute
     }
-}
-
-fn predicted(traces: &[Trace], log: &Log, joint: Joint) -> Vec<Vec<(f64, f64)>> {
-    let shown = |trace: &Trace| beginning(log, &trace.time, &trace.q[joint]);
-    let pieces = traces.iter().map(shown);
-    pieces.filter(|piece| piece.len() > 1).collect()
 }
 
 /// The residual generalised force over angle, speed, torque and time, without and with the effects.

@@ -73,12 +73,8 @@ const CLOUD: usize = 300;
 
 impl PlotData {
     pub fn of(outcome: &Outcome) -> Self {
-        let series: Vec<Series<'_>> = match outcome.error_model {
-            ErrorModel::OutputError => motions(outcome),
-            ErrorModel::InverseDynamics => torques(outcome),
-        };
         Self {
-            segments: segments(outcome, &series),
+            segments: segments(outcome, &series(outcome)),
             motion: MotionEntry::of(outcome),
             residuals: scatters(outcome),
         }
@@ -95,6 +91,14 @@ pub(super) struct Series<'a> {
     pub measured: Vec<Vec<f64>>,
     /// The fitted declared model, the model with effects and, if used, the model with a network: `[model][joint][row]`.
     pub models: Vec<Vec<Vec<f64>>>,
+}
+
+/// What was compared on the test logs, of those that have any.
+pub(super) fn series(outcome: &Outcome) -> Vec<Series<'_>> {
+    match outcome.error_model {
+        ErrorModel::OutputError => motions(outcome),
+        ErrorModel::InverseDynamics => torques(outcome),
+    }
 }
 
 /// Open-loop predictions over the longest horizon, one after the other.
@@ -164,10 +168,10 @@ fn torques(outcome: &Outcome) -> Vec<Series<'_>> {
 }
 
 /// Rows of a series.
-type Rows = std::ops::Range<usize>;
+pub(super) type Rows = std::ops::Range<usize>;
 
 /// The windows of a series.
-fn windows(one: &Series<'_>) -> Vec<Rows> {
+pub(super) fn windows(one: &Series<'_>) -> Vec<Rows> {
     let ends = one.window.chunk_by(|a, b| a == b);
     let window = |start: &mut usize, part: &[usize]| {
         let rows = *start..*start + part.len();
