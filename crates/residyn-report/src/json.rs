@@ -7,11 +7,11 @@ use super::plot_data::PlotData;
 use super::schema::{
     AlternativeEntry, AuditEntry, CombinationEntry, ContenderEntry, ContradictedEntry, EffectEntry,
     EffectName, ErrorEntry, FilesEntry, FitEntry, FitsEntry, IdentifiabilityEntry, LogEntry,
-    LogsEntry, ModelError, NormEntry, ParameterEntry, RefittedEntry, Report, SCHEMA, TorqueEntry,
-    TriedEntry, UnexplainedEntry,
+    LogsEntry, ModelError, NormEntry, ParameterEntry, RefittedEntry, Report, SCHEMA, TriedEntry,
+    UnexplainedEntry,
 };
 use residyn_core::closeloop::{
-    Alternative, Contradicted, Finding, Outcome, ResidualForce, Round, TorqueErrors, Tried,
+    Alternative, Contradicted, Finding, Outcome, ResidualForce, Round, Tried,
 };
 use residyn_core::data::{Audit, Joint, Log};
 use residyn_core::identify::{Combination, Fit, FitError};
@@ -68,7 +68,7 @@ impl Report {
             smoothing_velocities: outcome.models.after.model.smoothing_velocities(),
             compared: outcome.error_model,
             error: errors(outcome),
-            torque: outcome.errors.torque.clone().map(TorqueEntry::from),
+            torque: outcome.errors.torque.clone(),
             residual_norm: norms(&outcome.diagnostics.before, &outcome.diagnostics.after),
             logs: logs(outcome),
             audit: audits(outcome),
@@ -361,18 +361,6 @@ fn tried(outcome: &Outcome) -> Vec<Vec<TriedEntry>> {
     };
     let round = |round: &Round| round.tried.iter().map(entry).collect();
     outcome.effects.rounds.iter().map(round).collect()
-}
-
-impl From<TorqueErrors> for TorqueEntry {
-    fn from(errors: TorqueErrors) -> Self {
-        Self {
-            as_declared: errors.declared,
-            before: errors.before,
-            with_friction: errors.with_friction,
-            after: errors.after,
-            reduction_ci95: errors.reduction_ci95,
-        }
-    }
 }
 
 fn joint_names(model: &Model) -> Vec<String> {

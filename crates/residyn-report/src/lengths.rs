@@ -22,7 +22,7 @@ impl Report {
             lengths.extend([log.before.len(), log.after.len()].map(|found| [joints, found]));
         }
         if let Some(torque) = &self.torque {
-            let fitted = [&torque.as_declared, &torque.before, &torque.after];
+            let fitted = [&torque.declared, &torque.before, &torque.after];
             let models = fitted.into_iter().chain(&torque.with_friction);
             lengths.extend(models.map(|model| [joints, model.rms.len()]));
         }

@@ -12,11 +12,10 @@ use super::calibration::CalibrationEntry;
 use super::plot_data::PlotData;
 use residyn_core::closeloop::{
     Curve, ErrorModel, NetworkCheck, Proposal, Separation, Settings, SplitMethod, TestLog,
-    Unexplained, Verdict,
+    TorqueErrors, Unexplained, Verdict,
 };
 use residyn_core::data::{Finding as AuditFinding, Joint, Severity};
 use residyn_core::model::Call;
-use residyn_core::sim::metric::TorqueError;
 
 /// Version of the names in `report.json`.
 pub(super) const SCHEMA: u32 = 2;
@@ -89,7 +88,7 @@ pub struct Report {
     pub(super) compared: ErrorModel,
     pub(super) error: ErrorEntry,
     /// error of the torques that the logged motion needs, low-passed; null for a model that gives accelerations
-    pub(super) torque: Option<TorqueEntry>,
+    pub(super) torque: Option<TorqueErrors>,
     /// residual generalised force, root mean square over blocks of 0.15 s, N m or N
     pub(super) residual_norm: NormEntry,
     pub(super) logs: LogsEntry,
@@ -303,18 +302,6 @@ pub(super) struct CombinationEntry {
     #[schemars(with = "Ends")]
     pub ci95: [f64; 2],
     pub unit: String,
-}
-
-/// error of the torques that the logged motion needs, on the test logs
-#[derive(Debug, Serialize, Deserialize, JsonSchema)]
-pub(super) struct TorqueEntry {
-    pub as_declared: TorqueError,
-    pub before: TorqueError,
-    /// with Coulomb and viscous friction on every joint, fitted; null if the declared model has both
-    pub with_friction: Option<TorqueError>,
-    pub after: TorqueError,
-    /// 95 % interval of the relative reduction of the error, before to after
-    pub reduction_ci95: Option<[f64; 2]>,
 }
 
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]

@@ -1,12 +1,12 @@
 //! How much better: the errors on logs that were never fitted.
 
 use super::{Block, Cell, cell, heading, paragraph, paragraphs, table};
-use crate::schema::{ErrorEntry, ModelError, Report, TorqueEntry};
+use crate::schema::{ErrorEntry, ModelError, Report};
 use crate::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_FRICTION, WITH_NETWORK, ZEROED, capitalised, listed,
     small,
 };
-use residyn_core::closeloop::{ErrorModel, TestLog};
+use residyn_core::closeloop::{ErrorModel, TestLog, TorqueErrors};
 use residyn_core::data::{Joint, Quantity};
 use residyn_core::sim::metric::TorqueError;
 
@@ -93,8 +93,8 @@ fn ratio(after: f64, before: f64) -> Cell {
     }
 }
 
-fn of_torques(report: &Report, errors: &TorqueEntry) -> Vec<Block> {
-    let mut models = vec![(AS_WRITTEN, &errors.as_declared), (FITTED, &errors.before)];
+fn of_torques(report: &Report, errors: &TorqueErrors) -> Vec<Block> {
+    let mut models = vec![(AS_WRITTEN, &errors.declared), (FITTED, &errors.before)];
     models.extend(errors.with_friction.iter().map(|m| (WITH_FRICTION, m)));
     models.push((WITH_EFFECTS, &errors.after));
     let row = |name: String, text: &dyn Fn(&TorqueError) -> String, share: Cell| {

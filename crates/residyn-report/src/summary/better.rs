@@ -2,9 +2,9 @@
 
 use super::{listed, paragraph};
 use crate::document::{fitted_tests, position_unit, removed};
-use crate::schema::{ModelError, Report, TorqueEntry};
+use crate::schema::{ModelError, Report};
 use crate::wording::{WITH_FRICTION, small};
-use residyn_core::closeloop::ErrorModel;
+use residyn_core::closeloop::{ErrorModel, TorqueErrors};
 use residyn_core::data::Joint;
 
 /// Most rows of the table, not counting the row of all joints.
@@ -38,8 +38,8 @@ fn row(name: &str, numbers: [String; 3]) -> String {
     format!("  {name:<40}{written:>11}{fitted:>11}{with:>14}")
 }
 
-fn of_torques(report: &Report, errors: &TorqueEntry) -> Vec<String> {
-    let models = [&errors.as_declared, &errors.before, &errors.after];
+fn of_torques(report: &Report, errors: &TorqueErrors) -> Vec<String> {
+    let models = [&errors.declared, &errors.before, &errors.after];
     let of_joint = |joint: Joint| {
         let name = format!("joint {}", report.label(joint));
         row(&name, models.map(|model| small(model.rms[joint])))

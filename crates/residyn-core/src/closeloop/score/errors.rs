@@ -1,4 +1,6 @@
 use rand::Rng;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::bootstrap::{interval, reduction_interval};
 use super::test_log::TestLog;
@@ -37,16 +39,18 @@ pub struct Errors {
     pub reduction_ci95: Option<[f64; 2]>,
 }
 
-/// Errors of the torques on the test logs.
-#[derive(Debug, Clone, PartialEq)]
+/// error of the torques that the logged motion needs, on the test logs
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "TorqueEntry")]
 pub struct TorqueErrors {
-    /// Of the declared model with the values in its file.
+    // Of the declared model with the values in its file.
+    #[serde(rename = "as_declared")]
     pub declared: TorqueError,
     pub before: TorqueError,
-    /// With Coulomb and viscous friction on every joint, fitted.
+    /// with Coulomb and viscous friction on every joint, fitted; null if the declared model has both
     pub with_friction: Option<TorqueError>,
     pub after: TorqueError,
-    /// 95 % interval of the relative reduction, before to after.
+    /// 95 % interval of the relative reduction of the error, before to after
     pub reduction_ci95: Option<[f64; 2]>,
 }
 
