@@ -3,6 +3,7 @@
 use super::instant::SAME_S;
 use super::jumps::interpolated;
 use super::log::{Interval, Log};
+use super::statistics::ends;
 
 /// A step longer than this many median steps is a gap. Loops on desktop systems overrun by two or
 /// three periods as a matter of course; beyond five the motion between the rows is anyone's guess.
@@ -48,11 +49,8 @@ pub(super) fn dropped(log: &Log) -> Vec<Dropped> {
             count: (steps.round() as usize).max(2) - 1,
         })
     };
-    log.time
-        .windows(2)
-        .enumerate()
-        .filter_map(of_step)
-        .collect()
+    let steps = log.time.windows(2).enumerate();
+    steps.filter_map(of_step).collect()
 }
 
 impl Log {
@@ -64,9 +62,11 @@ impl Log {
         if missing.is_empty() {
             return self;
         }
-        let small: Vec<f64> = (self.tau.iter())
-            .map(|tau| SMALL_CHANGE * range(tau))
-            .collect();
+        let small = |tau: &Vec<f64>| {
+            let [lowest, highest] = ends(tau);
+            SMALL_CHANGE * (highest - lowest)
+        };
+        let small: Vec<f64> = self.tau.iter().map(small).collect();
         let rough = missing.iter().filter(|d| !self.is_smooth_over(d, &small));
         let rough: Vec<Interval> = rough.map(|d| self.step_of(d)).collect();
         if rough.len() as f64 * window_s <= 0.5 * self.duration() {
@@ -114,12 +114,10 @@ impl Log {
         }
         self.time = with_rows(time, missing, |row, share| between(time, row, share));
         // Number of rows inserted before each step, and before the end.
-        let before: Vec<usize> = std::iter::once(0)
-            .chain(missing.iter().scan(0, |sum, dropped| {
-                *sum += dropped.count;
-                Some(*sum)
-            }))
-            .collect();
+        let mut before = vec![0];
+        for (step, dropped) in missing.iter().enumerate() {
+            before.push(before[step] + dropped.count);
+        }
         for marked in self.masked.iter_mut().chain([&mut self.filled]) {
             for at in marked {
                 *at += before[missing.partition_point(|dropped| dropped.row < *at)];
@@ -148,12 +146,6 @@ fn with_rows(channel: &[f64], missing: &[Dropped], value: impl Fn(usize, f64) ->
     }
     whole.extend_from_slice(&channel[from..]);
     whole
-}
-
-/// Largest minus smallest value.
-fn range(values: &[f64]) -> f64 {
-    let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    highest - values.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -195,26 +187,18 @@ mod tests {
     fn a_torque_that_jumps_while_rows_are_missing_leaves_the_step_out() {
         let steps = log(|t| if t > 3.0 { 1.0 } else { -1.0 });
         let full = steps.clone().completed(0.5);
-        assert_eq!(
-            full.leave_out,
-            [Interval {
-                start_s: 2.99,
-                end_s: 3.02
-            }]
-        );
-        assert!(
-            steps.completed(20.0).leave_out.is_empty(),
-            "little else would remain"
-        );
+        let [start_s, end_s] = [2.99, 3.02];
+        assert_eq!(full.leave_out, [Interval { start_s, end_s }]);
+        // Little else would remain.
+        assert!(steps.completed(20.0).leave_out.is_empty());
     }
 
     #[test]
     fn jitter_and_gaps_are_no_dropped_rows() {
         let mut jittery = log(|_| 0.0);
         let rows = jittery.rows();
-        jittery.time = (0..rows)
-            .map(|i| 0.01 * (i as f64 + 0.3 * (i % 2) as f64))
-            .collect();
+        let late = |i: usize| 0.01 * (i as f64 + 0.3 * (i % 2) as f64);
+        jittery.time = (0..rows).map(late).collect();
         assert!(dropped(&jittery).is_empty());
         jittery.time.iter_mut().skip(500).for_each(|t| *t += 1.0);
         assert!(dropped(&jittery).is_empty());

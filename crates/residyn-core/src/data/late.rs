@@ -23,9 +23,7 @@ pub(super) fn cut(mut log: Log, late_s: impl IntoIterator<Item = f64>) -> Log {
     let (from, to) = (first - early, last - late);
     let begin = row_from(&log.time, from);
     let end = row_after(&log.time, to).max(begin);
-    let motion = log.q.iter_mut().chain(&mut log.qd);
-    let channels = motion.chain(&mut log.tau).chain([&mut log.time]);
-    for channel in channels {
+    for channel in log.columns_mut() {
         channel.truncate(end);
         channel.drain(..begin);
     }

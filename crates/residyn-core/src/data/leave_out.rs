@@ -55,9 +55,8 @@ impl FromStr for LeaveOut {
     type Err = LeaveOutError;
 
     fn from_str(text: &str) -> Result<Self, LeaveOutError> {
-        let syntax = || LeaveOutError::Syntax {
-            text: text.to_owned(),
-        };
+        let given = || text.to_owned();
+        let syntax = || LeaveOutError::Syntax { text: given() };
         // The last `@`, since file names may hold one and times do not.
         let (log, times) = text.rsplit_once('@').ok_or_else(syntax)?;
         let interval = parse_interval(times).ok_or_else(syntax)?;
@@ -65,9 +64,7 @@ impl FromStr for LeaveOut {
             return Err(syntax());
         }
         if interval.start_s < 0.0 || interval.length_s() <= 0.0 {
-            return Err(LeaveOutError::Backwards {
-                text: text.to_owned(),
-            });
+            return Err(LeaveOutError::Backwards { text: given() });
         }
         let log = log.to_owned();
         Ok(LeaveOut { log, interval })
@@ -109,8 +106,8 @@ pub fn apply(logs: &mut [Log], entries: &[LeaveOut]) -> Result<(), LeaveOutError
 }
 
 fn overlaps(log: &Log, interval: Interval) -> bool {
-    let inside = |&&t: &&f64| interval.start_s <= t && t <= interval.end_s;
-    log.time.iter().any(|t| inside(&t))
+    let is_inside = |t: &f64| (interval.start_s..=interval.end_s).contains(t);
+    log.time.iter().any(is_inside)
 }
 
 /// Index of the log that is called `name`.
@@ -119,21 +116,18 @@ fn place(logs: &[Log], name: &str) -> Result<usize, LeaveOutError> {
     if let Some(place) = logs.iter().position(by_path) {
         return Ok(place);
     }
-    let called: Vec<usize> = (0..logs.len())
-        .filter(|&place| logs[place].name() == name)
-        .collect();
+    let all: Vec<usize> = (0..logs.len()).collect();
+    let called = all.iter().copied().filter(|at| logs[*at].name() == name);
     let list = |places: &[usize]| {
-        let paths = places
-            .iter()
-            .map(|&place| logs[place].path.display().to_string());
+        let paths = places.iter().map(|at| logs[*at].path.display().to_string());
         paths.collect::<Vec<_>>().join(", ")
     };
     let log = name.to_owned();
-    match called.as_slice() {
+    match &*called.collect::<Vec<usize>>() {
         [place] => Ok(*place),
         [] => Err(LeaveOutError::Unknown {
             log,
-            logs: list(&(0..logs.len()).collect::<Vec<_>>()),
+            logs: list(&all),
         }),
         several => Err(LeaveOutError::Ambiguous {
             log,
@@ -151,7 +145,6 @@ fn same_path(a: &Path, b: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Quantity;
 
     fn parse(text: &str) -> Result<(f64, f64), LeaveOutError> {
         let LeaveOut { interval, .. } = text.parse()?;
@@ -162,14 +155,7 @@ mod tests {
         Log {
             path: path.into(),
             time: vec![0.0, 10.0, 20.0],
-            q: vec![],
-            qd: vec![],
-            tau: vec![],
-            driven_by: Quantity::Torque,
-            masked: vec![],
-            filled: vec![],
-            leave_out: vec![],
-            notes: vec![],
+            ..Log::empty(0)
         }
     }
 
@@ -182,27 +168,16 @@ mod tests {
 
     #[test]
     fn what_is_no_interval_is_an_error() {
-        for text in [
-            "rig.csv",
-            "rig.csv@",
-            "rig.csv@1",
-            "rig.csv@1e-3",
-            "@1-2",
-            "r@1-2-3",
-            "r@0-inf",
+        let text = |text: &str| text.to_owned();
+        for no_interval in [
+            "rig.csv", "r@", "r@1", "r@1e-3", "@1-2", "r@1-2-3", "r@0-inf",
         ] {
-            let error = parse(text).unwrap_err();
-            assert!(
-                matches!(error, LeaveOutError::Syntax { .. }),
-                "{text}: {error}"
-            );
+            let text = text(no_interval);
+            assert_eq!(parse(no_interval), Err(LeaveOutError::Syntax { text }));
         }
-        for text in ["r@2-1", "r@1-1", "r@-1-2", "r@1--2"] {
-            let error = parse(text).unwrap_err();
-            assert!(
-                matches!(error, LeaveOutError::Backwards { .. }),
-                "{text}: {error}"
-            );
+        for backwards in ["r@2-1", "r@1-1", "r@-1-2", "r@1--2"] {
+            let text = text(backwards);
+            assert_eq!(parse(backwards), Err(LeaveOutError::Backwards { text }));
         }
     }
 

@@ -181,6 +181,13 @@ impl Log {
             .chain(&self.tau)
     }
 
+    pub(super) fn columns_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+        std::iter::once(&mut self.time)
+            .chain(&mut self.q)
+            .chain(&mut self.qd)
+            .chain(&mut self.tau)
+    }
+
     /// Checks that a reader would accept every number of the log as a file at `path`.
     ///
     /// # Errors

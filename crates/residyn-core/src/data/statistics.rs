@@ -19,6 +19,13 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
+/// Lowest and highest value; infinite for no values.
+pub(crate) fn ends(values: &[f64]) -> [f64; 2] {
+    let each = || values.iter().copied();
+    let low = each().fold(f64::INFINITY, f64::min);
+    [low, each().fold(f64::NEG_INFINITY, f64::max)]
+}
+
 /// Root mean square; NaN for no values.
 pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()

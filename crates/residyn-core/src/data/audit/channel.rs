@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::data::examined::at_examined;
 use crate::data::signal::{noise_std, resolution};
+use crate::data::statistics::ends;
 
 /// One column of a log: what its numbers look like, in the column's own unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,13 +38,14 @@ impl Channel {
     /// Measures one column with at least one row. `spikes` is counted by the caller, as its meaning
     /// depends on the kind of channel.
     pub(super) fn of(name: String, values: &[f64], spikes: usize) -> Self {
-        let min = values.iter().copied().fold(f64::INFINITY, f64::min);
-        let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let [min, max] = ends(values);
         let examined = at_examined(values);
         let resolution = resolution(&examined);
         let noise = noise_std(&examined);
-        let at_limit = |limit: &f64| saturated_rows(values, *limit, max - min, resolution);
-        let saturated: usize = [max, min].iter().map(at_limit).sum();
+        let at = |limit| (limit, saturated_rows(values, limit, max - min, resolution));
+        let at_limits = [max, min].map(at);
+        let saturated: usize = at_limits.iter().map(|(_, rows)| rows).sum();
+        let reached = at_limits.iter().filter(|(_, rows)| *rows > 0);
         Self {
             name,
             min,
@@ -57,10 +59,7 @@ impl Channel {
             spikes,
             saturated_fraction: saturated as f64 / values.len() as f64,
             constant: min == max,
-            limits: [max, min]
-                .into_iter()
-                .filter(|limit| at_limit(limit) > 0)
-                .collect(),
+            limits: reached.map(|(limit, _)| *limit).collect(),
         }
     }
 
@@ -98,40 +97,32 @@ fn saturated_rows(values: &[f64], limit: f64, range: f64, resolution: f64) -> us
 mod tests {
     use super::*;
 
-    fn sine(amplitude: f64) -> Vec<f64> {
-        (0..5000)
-            .map(|i| amplitude * (i as f64 * 0.01).sin())
-            .collect()
-    }
-
-    fn saturated(values: &[f64]) -> f64 {
-        Channel::of("tau1".to_owned(), values, 0).saturated_fraction
+    /// The share of a sine's rows at its limits, after a change of its values.
+    fn saturated(change: impl Fn(f64) -> f64) -> f64 {
+        let values: Vec<f64> = (0..5000)
+            .map(|i| change((f64::from(i) * 0.01).sin()))
+            .collect();
+        Channel::of("tau1".to_owned(), &values, 0).saturated_fraction
     }
 
     #[test]
     fn clipping_is_distinguished_from_reversal() {
-        assert_eq!(saturated(&sine(1.0)), 0.0);
-        let clipped: Vec<f64> = sine(1.0)
-            .iter()
-            .map(|value| value.clamp(-0.8, 0.8))
-            .collect();
+        assert_eq!(saturated(|value| value), 0.0);
         // |sin| > 0.8 for 1 - 2 asin(0.8) / pi = 41 % of the time.
-        assert!((saturated(&clipped) - 0.41).abs() < 0.01);
+        assert!((saturated(|value| value.clamp(-0.8, 0.8)) - 0.41).abs() < 0.01);
         for step in [0.0088, 0.05, 0.13] {
-            let rounded: Vec<f64> = sine(1.0)
-                .iter()
-                .map(|value| (value / step).round() * step)
-                .collect();
-            assert_eq!(saturated(&rounded), 0.0, "{step}");
+            assert_eq!(
+                saturated(|value| (value / step).round() * step),
+                0.0,
+                "{step}"
+            );
         }
     }
 
     #[test]
     fn bang_bang_is_saturated_and_rest_is_not() {
-        let bang: Vec<f64> = sine(1.0).iter().map(|value| 0.9 * value.signum()).collect();
-        assert!(saturated(&bang) > 0.99);
-        let pushes: Vec<f64> = sine(1.0).iter().map(|value| value.max(0.0)).collect();
-        assert_eq!(saturated(&pushes), 0.0);
-        assert_eq!(saturated(&[2.0; 100]), 0.0);
+        assert!(saturated(|value| 0.9 * value.signum()) > 0.99);
+        assert_eq!(saturated(|value| value.max(0.0)), 0.0);
+        assert_eq!(saturated(|_| 2.0), 0.0);
     }
 }

@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use super::channel::Channel;
 use super::motion::Motion;
-use super::regressors::regressors;
+use super::regression::regressors;
 use crate::data::Joint;
 use crate::data::jumps::{JUMP_MADS, JUMP_RESOLUTION_STEPS, JUMP_SHARE_OF_RANGE};
 use crate::data::lag::{Lag, lag};
-use crate::data::projection::{explained_by, orthonormal};
+use crate::data::projection::{dot, orthonormal, unexplained};
 use crate::data::signal::interpolate;
 use crate::data::statistics::{SIGMA_PER_MAD, mad, median};
 
@@ -81,15 +81,10 @@ pub(super) fn velocity_check(
         fast_rad_s,
     } = speeds;
     let found = lag_of(motion, &motion.qd, step_s).filter(|_| fast_rad_s > 2.0 * rest_rad_s);
-    let Some(Lag {
-        samples,
-        correlation,
-        ..
-    }) = found
-    else {
+    let Some(found) = found else {
         return (None, Vec::new());
     };
-    let lag_s = samples * lag_step_s(step_s);
+    let lag_s = found.samples * lag_step_s(step_s);
     let (rows, pairs) = aligned_velocities(motion, lag_s);
     let scale = velocity_scale(&pairs, fast_rad_s);
     let off = |(logged, derived): &(f64, f64)| logged - scale * derived;
@@ -102,7 +97,7 @@ pub(super) fn velocity_check(
     let sizes = || pairs.iter().map(|pair| off(pair).abs());
     let disagreeing = rows.iter().zip(sizes()).filter(|(_, size)| *size > floor);
     let check = VelocityCheck {
-        correlation,
+        correlation: found.correlation,
         lag_s,
         scale,
         noise_std_rad_s: SIGMA_PER_MAD * spread,
@@ -184,19 +179,13 @@ pub(super) fn torque_lag(
     let uniform = |values: &[f64]| motions[joint].resampled(values, lag_step_s(step_s));
     let columns = regressors(motions, fast_rad_s, joint);
     let basis: Vec<Vec<f64>> = columns.iter().map(|column| uniform(column)).collect();
-    let (tau, acceleration) = (
-        uniform(&motions[joint].tau),
-        uniform(&motions[joint].acceleration),
-    );
+    let motion = &motions[joint];
+    let (tau, acceleration) = (uniform(&motion.tau), uniform(&motion.acceleration));
     if unexplained_share(&basis, &acceleration) < MIN_UNEXPLAINED {
         return None;
     }
-    let found = lag(
-        &tau,
-        &acceleration,
-        &basis,
-        -MAX_TORQUE_LEAD..=reach(step_s),
-    )?;
+    let lags = -MAX_TORQUE_LEAD..=reach(step_s);
+    let found = lag(&tau, &acceleration, &basis, lags)?;
     let clear = found.correlation >= MIN_TORQUE_CORRELATION && !found.at_edge;
     clear.then_some(TorqueLag {
         lag_s: found.samples * lag_step_s(step_s) - 0.5 * step_s,
@@ -206,22 +195,23 @@ pub(super) fn torque_lag(
 
 /// Share of a series' variance that the columns do not explain; the first of them is a constant.
 fn unexplained_share(columns: &[Vec<f64>], series: &[f64]) -> f64 {
-    let left = |columns: &[Vec<f64>]| {
-        let part = explained_by(&orthonormal(columns.iter().cloned()), series);
-        let rest = series.iter().zip(part).map(|(all, part)| all - part);
-        rest.map(|x| x * x).sum::<f64>()
+    let basis = orthonormal(columns.iter().cloned());
+    let left = |basis: &[Vec<f64>]| {
+        let rest = unexplained(basis, series);
+        dot(&rest, &rest)
     };
-    left(columns) / left(&columns[..1]).max(f64::MIN_POSITIVE)
+    let constant = basis.get(..1).unwrap_or_default();
+    left(&basis) / left(constant).max(f64::MIN_POSITIVE)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::joint::{JointAudit, audit_joints};
-    use super::super::tests::{one_joint, swing};
+    use super::super::tests::{edited, one_joint, swing, uniform};
     use crate::data::log::Log;
 
     fn joint(log: &Log) -> JointAudit {
-        audit_joints(log).remove(0)
+        audit_joints(log).0.remove(0)
     }
 
     #[test]
@@ -278,18 +268,13 @@ mod tests {
         for row in 0..rows {
             qs.push(q);
             vs.push(v);
-            let held = if row < delay {
-                0.0
-            } else {
-                torque[row - delay]
-            };
+            let held = row.checked_sub(delay).map_or(0.0, |row| torque[row]);
             for _ in 0..20 {
                 v += step / 20.0 * (-15.0 * q.sin() - 0.5 * v + 20.0 * held);
                 q += step / 20.0 * v;
             }
         }
-        let time = (0..rows).map(|row| row as f64 * step).collect();
-        one_joint(time, qs, vs, torque)
+        one_joint(uniform(rows, step), qs, vs, torque)
     }
 
     #[test]
@@ -305,22 +290,19 @@ mod tests {
 
     #[test]
     fn a_motion_that_gravity_explains_shows_no_torque_lag() {
-        let mut log = swing();
         // A small swing alone: its acceleration is that of a spring, whatever the torque does.
-        let over = |f: &dyn Fn(f64) -> f64| log.time.iter().map(|t| f(*t)).collect::<Vec<f64>>();
-        let (q, qd) = (
-            over(&|t| 0.1 * (5.0 * t).sin()),
-            over(&|t| 0.5 * (5.0 * t).cos()),
-        );
-        let tau = over(&|t| (5.0 * t - 0.1).cos() + 0.1 * (15.0 * t - 0.3).cos());
-        (log.q[0], log.qd[0], log.tau[0]) = (q, qd, tau);
+        let log = edited(|log| {
+            let over = |f: fn(f64) -> f64| log.time.iter().map(|t| f(*t)).collect();
+            log.q[0] = over(|t| 0.1 * (5.0 * t).sin());
+            log.qd[0] = over(|t| 0.5 * (5.0 * t).cos());
+            log.tau[0] = over(|t| (5.0 * t - 0.1).cos() + 0.1 * (15.0 * t - 0.3).cos());
+        });
         assert_eq!(joint(&log).torque_lag, None);
     }
 
     #[test]
     fn a_passive_joint_has_no_torque_lag() {
-        let mut log = swing();
-        log.tau[0].fill(0.0);
+        let log = edited(|log| log.tau[0].fill(0.0));
         assert_eq!(joint(&log).torque_lag, None);
     }
 }

@@ -2,18 +2,13 @@
 
 use serde::Serialize;
 
-use super::motion::Motion;
-use super::regressors::regressors;
-use crate::data::Joint;
+use super::regression::Regression;
 use crate::data::local_cubic::LocalCubic;
-use crate::data::projection::{explained_by, orthonormal};
+use crate::data::projection::{difference, explained_by, unexplained};
 use crate::data::statistics::{deviation, rms};
 
 /// Rows beyond this many times the largest torque that the motion needs count as far off.
 const FAR_OFF: f64 = 2.0;
-
-/// A regression with fewer rows than this per column says nothing.
-const ROWS_A_COLUMN: usize = 10;
 
 /// The torque of a joint against a linear regression of it on the joint's motion: gravity, friction, the
 /// accelerations of all joints.
@@ -35,22 +30,14 @@ pub struct TorqueDemand {
     pub explained: f64,
 }
 
-/// Compares one joint's torque with its motion; `None` if the torque is constant or the log too short.
-///
-/// `fast_rad_s` holds the fast speed of every joint; the motions are smoothed over `half_width_s` on either side.
+/// Compares one joint's torque with its motion, which is smoothed over `half_width_s` on either side; `None` if the
+/// torque is constant.
 pub(super) fn torque_demand(
-    motions: &[Motion],
-    fast_rad_s: &[f64],
-    joint: Joint,
+    regression: &Regression<'_>,
     half_width_s: f64,
 ) -> Option<TorqueDemand> {
-    let motion = &motions[joint];
-    let mut columns = regressors(motions, fast_rad_s, joint);
-    columns.push(motion.acceleration.clone());
-    if motion.rows() < ROWS_A_COLUMN * columns.len() {
-        return None;
-    }
-    let basis = orthonormal(columns.into_iter());
+    let motion = regression.motion;
+    let basis = || regression.basis.iter().chain(&regression.acceleration);
     let (slow, logged) = (&motion.tau, &motion.tau_logged);
     let (about_mean, of_logged) = (deviation(slow), deviation(logged));
     let is_constant = logged.windows(2).all(|pair| pair[0] == pair[1]);
@@ -58,34 +45,30 @@ pub(super) fn torque_demand(
     if is_constant || about_mean == 0.0 || of_logged == 0.0 {
         return None;
     }
-    let needed = explained_by(&basis, slow);
+    let needed = explained_by(basis(), slow);
     let needed_nm = needed.iter().fold(0.0_f64, |top, tau| top.max(tau.abs()));
     let far = |tau: &&f64| tau.abs() > FAR_OFF * needed_nm;
-    let left = |series: &[f64]| rms(&difference(series, &explained_by(&basis, series)));
+    let left = |rest: &[f64], of: f64| (rms(rest) / of).powi(2);
     Some(TorqueDemand {
         slow_hz: LocalCubic::cutoff_hz(half_width_s),
         slow_nm: about_mean,
         fast_nm: rms(&difference(logged, slow)),
         needed_nm,
         far_off: logged.iter().filter(far).count() as f64 / logged.len() as f64,
-        explained_slow: 1.0 - (left(slow) / about_mean).powi(2),
-        explained: 1.0 - (left(logged) / of_logged).powi(2),
+        explained_slow: 1.0 - left(&difference(slow, &needed), about_mean),
+        explained: 1.0 - left(&unexplained(basis(), logged), of_logged),
     })
-}
-
-fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::joint::audit_joints;
-    use super::super::tests::swing;
+    use super::super::tests::{each, edited, swing};
     use super::TorqueDemand;
     use crate::data::log::Log;
 
     fn demand(log: &Log) -> Option<TorqueDemand> {
-        audit_joints(log).remove(0).torque_demand
+        audit_joints(log).0.remove(0).torque_demand
     }
 
     #[test]
@@ -99,13 +82,9 @@ mod tests {
 
     #[test]
     fn chatter_stays_apart_from_the_motion() {
-        let mut log = swing();
         // +-30 N m from row to row: 250 Hz.
-        let signs = [30.0, -30.0].into_iter().cycle();
-        log.tau[0]
-            .iter_mut()
-            .zip(signs)
-            .for_each(|(tau, c)| *tau += c);
+        let sign = |row: usize| if row.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let mut log = edited(|log| each(&mut log.tau[0], |row, tau| tau + 30.0 * sign(row)));
         let found = demand(&log).unwrap();
         assert!((found.fast_nm - 30.0).abs() < 1.5, "{found:?}");
         assert!(found.explained_slow > 0.99, "{found:?}");
@@ -121,18 +100,7 @@ mod tests {
 
     #[test]
     fn constant_torques_and_short_logs_have_no_demand() {
-        let mut log = swing();
-        log.tau[0].fill(0.7);
-        assert_eq!(demand(&log), None);
-        let mut log = swing();
-        for column in [
-            &mut log.time,
-            &mut log.q[0],
-            &mut log.qd[0],
-            &mut log.tau[0],
-        ] {
-            column.truncate(100);
-        }
-        assert_eq!(demand(&log), None);
+        assert_eq!(demand(&edited(|log| log.tau[0].fill(0.7))), None);
+        assert_eq!(demand(&swing().at(&[0..100])), None);
     }
 }

@@ -10,6 +10,7 @@ use super::compare::{
 };
 use super::demand::{TorqueDemand, torque_demand};
 use super::motion::Motion;
+use super::regression::Regression;
 use super::response::{Response, response};
 use crate::data::Joint;
 use crate::data::column::Quantity;
@@ -64,6 +65,12 @@ pub struct JointAudit {
     /// Share of the rows in motion that repeat the angle of the row before although it should have
     /// moved by two steps of its resolution: a logger that is faster than its source.
     pub repeated_fraction: f64,
+    /// Rows in which the angle jumps.
+    #[serde(skip)]
+    pub(super) jumping: Vec<usize>,
+    /// Where the torque jumps.
+    #[serde(skip)]
+    pub(super) spiky: Vec<Interval>,
     /// Where the logged velocity disagrees with the derivative of the angle.
     #[serde(skip)]
     pub(super) disagreeing: Vec<Interval>,
@@ -75,37 +82,33 @@ pub struct JointAudit {
     pub(super) repeated: Vec<Interval>,
 }
 
-/// Audits every joint of a log.
+/// Audits every joint of a log, and follows the motions in which accelerations are compared with torques.
 ///
 /// Angles that jump for a single row are counted, and then masked.
-pub(super) fn audit_joints(log: &Log) -> Vec<JointAudit> {
-    with_motions(log).0
-}
-
-/// As [`audit_joints`], with the motions in which accelerations are compared with torques.
-pub(super) fn with_motions(log: &Log) -> (Vec<JointAudit>, Vec<Motion>) {
+pub(super) fn audit_joints(log: &Log) -> (Vec<JointAudit>, Vec<Motion>) {
     let jumps: Vec<Vec<usize>> = log.q.iter().map(|q| rows_that_jump(q)).collect();
     let log = &*log.without(&jumps);
     let step_s = log.median_step();
     let smoothed = |half_width_s: f64| -> Vec<Motion> {
-        Joint::all(log.joints())
-            .map(|joint| Motion::of(log, joint, half_width_s))
+        let all = Joint::all(log.joints());
+        all.map(|joint| Motion::of(log, joint, half_width_s))
             .collect()
     };
-    let mut joints: Vec<JointAudit> = Joint::all(log.joints())
-        .zip(&smoothed(half_width_s(step_s)))
-        .map(|(joint, motion)| JointAudit::of(log, step_s, joint, motion))
+    let motions = smoothed(half_width_s(step_s));
+    let each = Joint::all(log.joints()).zip(&motions).zip(jumps);
+    let mut joints: Vec<JointAudit> = each
+        .map(|((joint, motion), jumps)| JointAudit::of(log, step_s, joint, motion, jumps))
         .collect();
     let slow_s = half_width_s(step_s).max(SLOW_S);
     let slow = smoothed(slow_s);
-    for joint in Joint::all(log.joints()) {
-        let fast: Vec<f64> = joints.iter().map(|joint| joint.fast_rad_s).collect();
-        joints[joint].q.spikes = jumps[joint].len();
-        joints[joint].response = response(&slow, &fast, joint);
+    let fast: Vec<f64> = joints.iter().map(|joint| joint.fast_rad_s).collect();
+    for audit in &mut joints {
+        let regression = Regression::of(&slow, &fast, audit.joint);
+        audit.response = regression.as_ref().and_then(response);
         if log.driven_by == Quantity::Torque {
-            joints[joint].torque_lag = torque_lag(&slow, &fast, joint, step_s);
-            joints[joint].torque_demand = torque_demand(&slow, &fast, joint, slow_s);
-        } else if let Some(response) = &mut joints[joint].response {
+            audit.torque_demand = regression.and_then(|of| torque_demand(&of, slow_s));
+            audit.torque_lag = torque_lag(&slow, &fast, audit.joint, step_s);
+        } else if let Some(response) = &mut audit.response {
             // The torque that a drive makes of its command depends on the motion.
             response.to_torque = None;
         }
@@ -121,11 +124,12 @@ impl JointAudit {
     }
 
     /// Everything except what needs the other joints as well, or the log as it is.
-    fn of(log: &Log, step_s: f64, joint: Joint, motion: &Motion) -> Self {
+    fn of(log: &Log, step_s: f64, joint: Joint, motion: &Motion, jumping: Vec<usize>) -> Self {
         let (q, qd, tau) = (&log.q[joint], &log.qd[joint], &log.tau[joint]);
         let channel = |kind: &str, values, spikes| Channel::of(joint.name(kind), values, spikes);
-        let q_channel = channel("q", q, 0);
+        let q_channel = channel("q", q, jumping.len());
         let qd_channel = channel("qd", qd, 0);
+        let spiky = rows_that_jump(tau);
         // A log too short for derivatives still has a speed: the logged one.
         let (rows, velocity) = match motion.rows() {
             0 => (Cow::from_iter(0..log.rows()), qd),
@@ -134,11 +138,11 @@ impl JointAudit {
         let speeds: Vec<f64> = velocity.iter().map(|v| v.abs()).collect();
         let fast_rad_s = quantile(&speeds, 0.95);
         let rest_rad_s = rest_speed(&q_channel, fast_rad_s, step_s);
-        let range = Speeds {
+        let speed = Speeds {
             rest_rad_s,
             fast_rad_s,
         };
-        let (check, disagreeing) = velocity_check(motion, &qd_channel, range, step_s);
+        let (check, disagreeing) = velocity_check(motion, &qd_channel, speed, step_s);
         let resting: Vec<usize> = (rows.iter().zip(&speeds))
             .filter(|(_, speed)| **speed <= rest_rad_s)
             .map(|(row, _)| *row)
@@ -164,7 +168,9 @@ impl JointAudit {
                 spikes: disagreeing.len(),
                 ..qd_channel
             },
-            tau: channel(log.driven_by.key(), tau, rows_that_jump(tau).len()),
+            tau: channel(log.driven_by.key(), tau, spiky.len()),
+            spiky: log.intervals(spiky),
+            jumping,
         }
     }
 }
@@ -181,15 +187,9 @@ fn rest_speed(q: &Channel, fast_rad_s: f64, step_s: f64) -> f64 {
 
 /// Changes of direction with speeds above `rest` on both sides.
 fn reversals(velocity: &[f64], rest: f64) -> usize {
-    let moving: Vec<f64> = velocity
-        .iter()
-        .copied()
-        .filter(|v| v.abs() > rest)
-        .collect();
-    moving
-        .windows(2)
-        .filter(|pair| pair[0] * pair[1] < 0.0)
-        .count()
+    let moving = velocity.iter().copied().filter(|v| v.abs() > rest);
+    let turns = |pair: &&[f64]| pair[0] * pair[1] < 0.0;
+    moving.collect::<Vec<_>>().windows(2).filter(turns).count()
 }
 
 /// Rows in motion that repeat the angle of the row before.
@@ -214,42 +214,35 @@ impl Repeats {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{one_joint, swing};
+    use super::super::tests::{each, one_joint, swing, uniform};
     use super::*;
 
     fn joint(log: &Log) -> JointAudit {
-        audit_joints(log).remove(0)
+        audit_joints(log).0.remove(0)
     }
 
     #[test]
     fn reversals_turns_and_rest_are_counted() {
-        let time: Vec<f64> = (0..8000).map(|i| i as f64 * 0.001).collect();
+        let time = uniform(8000, 0.001);
         // Two swings over 8 rad, then rest with the jitter of one encoder step.
-        let angle = |i: usize| {
-            if i < 4000 {
-                4.0 * (time[i] * std::f64::consts::PI).cos()
+        let angle = |t: f64| {
+            if t < 4.0 {
+                4.0 * (t * std::f64::consts::PI).cos()
             } else {
                 4.0
             }
         };
         let jitter = |i: usize| 0.001 * f64::from(u8::from(i.is_multiple_of(7)));
-        let q = (0..8000)
-            .map(|i| ((angle(i) + jitter(i)) / 0.001).round() * 0.001)
-            .collect();
-        let joint = joint(&one_joint(
-            time.clone(),
-            q,
-            vec![0.0; 8000],
-            vec![0.0; 8000],
-        ));
-        assert_eq!(joint.reversals, 3);
+        let rounded = |(i, t): (usize, &f64)| ((angle(*t) + jitter(i)) / 0.001).round() * 0.001;
+        let q = time.iter().enumerate().map(rounded).collect();
+        let joint = joint(&one_joint(time, q, vec![0.0; 8000], vec![0.0; 8000]));
+        assert_eq!((joint.reversals, joint.velocity), (3, None));
         assert!(joint.covers_full_turn);
         assert!(
             (joint.share_at_rest - 0.5).abs() < 0.05,
             "{}",
             joint.share_at_rest
         );
-        assert_eq!(joint.velocity, None);
     }
 
     #[test]
@@ -257,7 +250,7 @@ mod tests {
         let mut log = swing();
         assert!(joint(&log).repeated_fraction < 0.01);
         let exact = log.q[0].clone();
-        (0..log.rows()).for_each(|row| log.q[0][row] = exact[row - row % 2]);
+        each(&mut log.q[0], |row, _| exact[row - row % 2]);
         assert!((joint(&log).repeated_fraction - 0.5).abs() < 0.05);
     }
 }

@@ -12,7 +12,7 @@ mod joint;
 mod misread;
 mod motion;
 mod quality;
-mod regressors;
+mod regression;
 mod repeats;
 mod response;
 mod rest;
@@ -28,8 +28,10 @@ pub use quality::{Audit, Finding, Remedy, Severity};
 pub use repeats::{Repeated, report_repeats};
 pub use response::Response;
 
+use std::borrow::Cow;
 use std::ops::Range;
 
+use self::misread::Reading;
 use super::columns::Columns;
 use super::dropped::{dropped, is_gap};
 use super::examined::examined;
@@ -64,12 +66,13 @@ pub fn audit_together<'l>(
 
 /// The audit of a log by itself.
 fn of_log(log: &Log, columns: &Columns) -> Audit {
-    let (meant, misread) = misread::as_meant(log, columns);
-    let mut audit = measured(&meant.log, meant.joints);
-    let findings = findings::of(&audit, &meant.log);
-    if !misread.is_empty() {
-        audit = measured(log, joint::audit_joints(log));
-    }
+    let read = Reading::of(Cow::Borrowed(log));
+    let (meant, misread) = misread::as_meant(&read, columns);
+    let mut audit = measured(log, read.joints);
+    let findings = match meant {
+        Some(Reading { log, joints, .. }) => findings::of(&measured(&log, joints), &log),
+        None => findings::of(&audit, log),
+    };
     audit.findings = [misread, findings].concat();
     audit.findings.sort_by_key(|finding| finding.severity);
     audit
@@ -117,7 +120,6 @@ fn relative_deviation(steps: &[f64], median_step_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Quantity;
 
     pub(super) fn audit(log: &Log) -> Audit {
         super::audit(log, &Columns::default())
@@ -130,16 +132,25 @@ mod tests {
             q: vec![q],
             qd: vec![qd],
             tau: vec![tau],
-            driven_by: Quantity::Torque,
-            masked: vec![vec![]],
-            filled: vec![],
-            leave_out: vec![],
-            notes: vec![],
+            ..Log::empty(1)
         }
     }
 
-    fn uniform(rows: usize, step_s: f64) -> Vec<f64> {
+    pub(super) fn uniform(rows: usize, step_s: f64) -> Vec<f64> {
         (0..rows).map(|row| row as f64 * step_s).collect()
+    }
+
+    /// Replaces each value of a channel, given its row.
+    pub(super) fn each(channel: &mut [f64], value: impl Fn(usize, f64) -> f64) {
+        let rows = channel.iter_mut().enumerate();
+        rows.for_each(|(row, x)| *x = value(row, *x));
+    }
+
+    /// The swing with a change.
+    pub(super) fn edited(change: impl FnOnce(&mut Log)) -> Log {
+        let mut log = swing();
+        change(&mut log);
+        log
     }
 
     /// A swing q = sin(3t) + 0.4 sin(7.3t) whose torque is its acceleration, sampled at 500 Hz.
@@ -154,9 +165,9 @@ mod tests {
 
     #[test]
     fn sampling_is_measured_apart_from_gaps() {
-        let mut log = swing();
-        log.time.iter_mut().skip(2500).for_each(|t| *t += 0.2);
-        let audit = audit(&log);
+        let audit = audit(&edited(|log| {
+            log.time[2500..].iter_mut().for_each(|t| *t += 0.2)
+        }));
         assert_eq!(audit.gaps.len(), 1);
         assert!((audit.gaps[0].length_s() - 0.202).abs() < 1e-9);
         assert!(audit.jitter < 1e-9 && (audit.max_step_s - 0.202).abs() < 1e-9);
@@ -165,18 +176,9 @@ mod tests {
     #[test]
     fn short_and_constant_logs_are_audited() {
         for rows in [2, 3, 5, 10, 30] {
-            let still = one_joint(
-                uniform(rows, 0.01),
-                vec![1.0; rows],
-                vec![0.0; rows],
-                vec![0.0; rows],
-            );
-            let ramp = one_joint(
-                uniform(rows, 0.01),
-                uniform(rows, 0.1),
-                vec![10.0; rows],
-                vec![1.0; rows],
-            );
+            let (time, level) = (uniform(rows, 0.01), |value| vec![value; rows]);
+            let still = one_joint(time.clone(), level(1.0), level(0.0), level(0.0));
+            let ramp = one_joint(time, uniform(rows, 0.1), level(10.0), level(1.0));
             for log in [still, ramp] {
                 let audit = audit(&log);
                 assert!(!audit.findings.is_empty());
@@ -187,20 +189,16 @@ mod tests {
 
     #[test]
     fn a_clock_that_jumps_by_years_costs_no_memory() {
-        let mut log = swing();
-        log.time.iter_mut().skip(2500).for_each(|t| *t += 1e9);
-        let audit = audit(&log);
+        let audit = audit(&edited(|log| {
+            log.time[2500..].iter_mut().for_each(|t| *t += 1e9)
+        }));
         assert_eq!((audit.gaps.len(), audit.joints[0].velocity), (1, None));
     }
 
     #[test]
     fn irregular_sampling_is_audited() {
-        let mut log = swing();
         let late = |row: usize| 0.0009 * ((row * 7919) % 13) as f64 / 13.0;
-        log.time
-            .iter_mut()
-            .enumerate()
-            .for_each(|(row, t)| *t += late(row));
+        let log = edited(|log| each(&mut log.time, |row, t| t + late(row)));
         assert!(audit(&log).jitter > 0.1);
     }
 }

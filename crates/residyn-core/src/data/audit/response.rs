@@ -2,13 +2,8 @@
 
 use serde::Serialize;
 
-use super::motion::Motion;
-use super::regressors::regressors;
-use crate::data::Joint;
-use crate::data::projection::{dot, explained_by, free_of, orthonormal};
-
-/// A regression with fewer rows than this per column says nothing.
-const ROWS_A_COLUMN: usize = 10;
+use super::regression::Regression;
+use crate::data::projection::{dot, free_of, unexplained};
 
 /// If the motion itself leaves a smaller share of an acceleration unexplained, the rest does not show how it responds
 /// to the torque: a smooth motion of many joints explains its own accelerations.
@@ -26,42 +21,22 @@ pub struct Response {
     pub to_torque: Option<f64>,
 }
 
-/// `None` if the joint has no acceleration or the log is too short; `fast_rad_s` holds the fast speed of every joint.
-pub(super) fn response(motions: &[Motion], fast_rad_s: &[f64], joint: Joint) -> Option<Response> {
-    let motion = &motions[joint];
-    let columns = regressors(motions, fast_rad_s, joint);
-    if motion.rows() < ROWS_A_COLUMN * (columns.len() + 1) {
-        return None;
-    }
-    let constant = orthonormal(columns[..1].iter().cloned());
-    let mut basis = orthonormal(columns.into_iter());
-    let acceleration = &motion.acceleration;
-    let varied = left(&constant, acceleration);
+/// `None` if the joint has no acceleration.
+pub(super) fn response(regression: &Regression<'_>) -> Option<Response> {
+    let Regression { motion, basis, .. } = regression;
+    let left = |rest: Vec<f64>| dot(&rest, &rest);
+    let varied = left(unexplained(&basis[..1], &motion.acceleration));
     if varied == 0.0 {
         return None;
     }
-    let is_open = left(&basis, acceleration) > LEFT * varied;
-    let torque = free_of(&basis, &motion.tau).filter(|_| is_open);
-    let rest = free_of(&basis, acceleration);
-    let to_torque = torque
-        .as_ref()
-        .zip(rest)
-        .map(|(torque, rest)| dot(torque, &rest));
-    basis.extend(torque);
+    let is_open = left(unexplained(basis, &motion.acceleration)) > LEFT * varied;
+    let torque = free_of(basis, &motion.tau).filter(|_| is_open);
+    let both = torque.as_ref().zip(regression.acceleration.as_ref());
+    let with_torque = basis.iter().chain(&torque);
     Some(Response {
-        explained: 1.0 - left(&basis, acceleration) / varied,
-        to_torque,
+        explained: 1.0 - left(unexplained(with_torque, &motion.acceleration)) / varied,
+        to_torque: both.map(|(torque, rest)| dot(torque, rest)),
     })
-}
-
-/// Sum of squares of a series that a basis leaves unexplained.
-fn left(basis: &[Vec<f64>], series: &[f64]) -> f64 {
-    let part = explained_by(basis, series);
-    series
-        .iter()
-        .zip(part)
-        .map(|(all, part)| (all - part).powi(2))
-        .sum()
 }
 
 #[cfg(test)]
@@ -71,7 +46,7 @@ mod tests {
     use crate::data::log::Log;
 
     fn response(log: &Log) -> super::Response {
-        audit_joints(log).remove(0).response.unwrap()
+        audit_joints(log).0.remove(0).response.unwrap()
     }
 
     #[test]

@@ -1,28 +1,17 @@
-//! What the measured quality of a log means for fitting a model to it, in plain sentences.
+//! What the measured quality of a log means for fitting a model to it, in plain sentences: two tables of checks, each
+//! run in turn.
 
-mod command;
-mod jumps;
-mod stuck;
-mod torque;
+mod angle;
+mod drive;
 mod velocity;
+mod whole;
 
 use super::joint::JointAudit;
 use super::quality::{Audit, Finding, Severity};
 use super::table::short;
 use crate::data::column::Quantity;
-use crate::data::dropped::dropped;
-use crate::data::log::{Interval, Log};
+use crate::data::log::Log;
 use Severity::{Info, Serious, Warning};
-
-/// Motion for less than this \[s\] is fewer than eight intervals of half a second, too few to distinguish effects.
-const LITTLE_MOTION_S: f64 = 4.0;
-
-/// Below this \[s\] not even one window of 0.5 s fits.
-const TOO_LITTLE_MOTION_S: f64 = 0.5;
-
-/// Beyond this about one step in ten overruns by a large part of a step, and lags of about one step
-/// cannot be resolved.
-const LARGE_JITTER: f64 = 0.05;
 
 /// With a larger share of bad rows, masking single rows does not save a column.
 const MANY_SPIKES: f64 = 0.01;
@@ -30,44 +19,78 @@ const MANY_SPIKES: f64 = 0.01;
 /// A smaller share of bad rows does not affect a robust fit.
 const SOME_SPIKES: f64 = 0.001;
 
-/// Beyond this share at rest, most rows show static friction at best.
-const MUCH_REST: f64 = 0.5;
+/// A log as it is meant, and what was measured of it.
+struct Seen<'a> {
+    log: &'a Log,
+    audit: &'a Audit,
+}
 
-/// Beyond this share, the logger reads its source more often than the source changes.
-const MANY_REPEATS: f64 = 0.2;
+/// The joints that a check looks at.
+enum Of {
+    Command,
+    ConstantTorque,
+    Torque,
+    Motion,
+}
 
-/// A smaller share of dropped rows hardly costs a window.
-const FEW_DROPPED: f64 = 0.001;
+/// The checks of a log as a whole.
+static WHOLE: [fn(&Seen<'_>) -> Option<Finding>; 7] = [
+    whole::left_out,
+    whole::examined,
+    whole::gaps,
+    whole::dropped_rows,
+    whole::jitter,
+    whole::little_motion,
+    whole::passive,
+];
+
+/// The checks of each joint.
+static JOINT: [(Of, fn(&JointAudit, &Seen<'_>) -> Option<Finding>); 16] = [
+    (Of::Command, drive::constant_command),
+    (Of::ConstantTorque, drive::constant_torque),
+    (Of::Torque, drive::one_sided),
+    (Of::Torque, drive::saturated),
+    (Of::Torque, drive::spikes),
+    (Of::Torque, drive::chatter),
+    (Of::Torque, drive::unexplained),
+    (Of::Torque, drive::lag),
+    (Of::Motion, angle::never_reverses),
+    (Of::Motion, angle::rests),
+    (Of::Motion, angle::repeats),
+    (Of::Motion, angle::freezes),
+    (Of::Motion, angle::jumps),
+    (Of::Motion, velocity::scale),
+    (Of::Motion, velocity::lag),
+    (Of::Motion, velocity::spikes),
+];
 
 /// All findings about a log, in the order of the joints.
 pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
-    let mut found = Found(vec![]);
-    found.about_reading(log);
-    found.about_examined(audit);
-    found.about_sampling(audit, log);
-    found.about_amount_of_motion(audit);
-    let by_torque = log.driven_by == Quantity::Torque;
-    let passive = by_torque && audit.joints.iter().all(is_passive);
-    if passive {
-        found.add(
-            Info,
-            "all torques are zero throughout: on a passive rig, only ratios to the inertia can be identified",
-        );
-    }
-    for joint in &audit.joints {
-        if !by_torque {
-            found.about_command(joint);
-        } else if !passive {
-            found.about_torque(joint, audit, log);
-        }
-        if joint.moves() {
-            found.about_excitation(joint);
-            found.about_angle(joint, log);
-            found.about_jumps(joint, log);
-            found.about_velocity(joint, audit);
+    let seen = &Seen { log, audit };
+    let notes = log.notes.iter().map(|note| Finding::new(Info, note));
+    let whole = WHOLE.iter().filter_map(|check| check(seen));
+    let joints = audit.joints.iter().flat_map(|joint| {
+        let checks = JOINT.iter().filter(move |(of, _)| seen.has(of, joint));
+        checks.filter_map(move |(_, check)| check(joint, seen))
+    });
+    notes.chain(whole).chain(joints).collect()
+}
+
+impl Seen<'_> {
+    fn has(&self, of: &Of, joint: &JointAudit) -> bool {
+        let is_torque = self.audit.driven_by == Quantity::Torque;
+        match of {
+            Of::Command => !is_torque,
+            Of::ConstantTorque => is_torque && joint.tau.constant && !self.is_passive(),
+            Of::Torque => is_torque && !joint.tau.constant,
+            Of::Motion => joint.moves(),
         }
     }
-    found.0
+
+    /// Whether no joint is driven.
+    fn is_passive(&self) -> bool {
+        self.audit.driven_by == Quantity::Torque && self.audit.joints.iter().all(is_passive)
+    }
 }
 
 fn is_passive(joint: &JointAudit) -> bool {
@@ -82,315 +105,271 @@ fn milliseconds(time_s: f64) -> String {
     format!("{} ms", short(1e3 * time_s))
 }
 
-/// How much a number of bad rows matters.
-fn spike_severity(spikes: usize, rows: usize) -> Severity {
-    let share = spikes as f64 / rows as f64;
-    if share > MANY_SPIKES {
-        Serious
-    } else if share > SOME_SPIKES {
-        Warning
-    } else {
-        Info
-    }
+/// A lag by its verb, its size and its steps.
+fn lag(lag_s: f64, step_s: f64) -> (&'static str, String, f64) {
+    let verb = if lag_s > 0.0 { "trails" } else { "leads" };
+    (verb, milliseconds(lag_s.abs()), lag_s.abs() / step_s)
 }
 
-struct Found(Vec<Finding>);
-
-impl Found {
-    fn add(&mut self, severity: Severity, text: impl Into<String>) {
-        self.0.push(Finding::new(severity, text));
-    }
-
-    /// A finding about intervals of the log.
-    fn add_during(&mut self, spans: &[Interval], severity: Severity, text: impl Into<String>) {
-        self.0.push(Finding::new(severity, text).during(spans));
-    }
-
-    /// A finding about one joint.
-    fn add_of(&mut self, joint: &JointAudit, severity: Severity, text: impl Into<String>) {
-        self.0.push(Finding::new(severity, text).of(joint.joint));
-    }
-
-    fn about_reading(&mut self, log: &Log) {
-        for note in &log.notes {
-            self.add(Info, note.clone());
-        }
-        if !log.leave_out.is_empty() {
-            let intervals: Vec<String> = log.leave_out.iter().map(Interval::to_string).collect();
-            self.add(
-                Info,
-                format!("left out, but audited: {}", intervals.join(", ")),
-            );
-        }
-    }
-
-    fn about_examined(&mut self, audit: &Audit) {
-        let Audit {
-            rows,
-            examined_rows,
-            ..
-        } = audit;
-        if examined_rows < rows {
-            self.add(
-                Info,
-                format!(
-                    "noise, resolution and motion are estimated from {examined_rows} of the {rows} rows, in intervals \
-                     spread evenly over the log; ranges, jumps, gaps and missing rows from all of them"
-                ),
-            );
-        }
-    }
-
-    fn about_sampling(&mut self, audit: &Audit, log: &Log) {
-        let Audit {
-            gaps,
-            jitter,
-            min_step_s,
-            max_step_s,
-            ..
-        } = audit;
-        if let Some(longest) = gaps
-            .iter()
-            .max_by(|a, b| a.length_s().total_cmp(&b.length_s()))
-        {
-            let text = format!(
-                "{} gap(s), the longest of {} s at t = {} s: no window spans them, but the first rows after a gap say \
-                 little about how the joints move; leave them out",
-                gaps.len(),
-                short(longest.length_s()),
-                short(longest.start_s)
-            );
-            self.0
-                .push(Finding::new(Warning, text).within(&audit.log, gaps));
-        }
-        self.about_dropped_rows(audit, log);
-        if *jitter > LARGE_JITTER {
-            self.add(
-                Warning,
-                format!(
-                    "the steps vary by {} of their median ({} to {}): delays shorter than the longest \
-                     step cannot be trusted; log from a real-time loop",
-                    percent(*jitter),
-                    milliseconds(*min_step_s),
-                    milliseconds(*max_step_s)
-                ),
-            );
-        }
-    }
-
-    fn about_dropped_rows(&mut self, audit: &Audit, log: &Log) {
-        let share = audit.dropped_rows as f64 / audit.rows as f64;
-        if audit.dropped_rows == 0 {
-            return;
-        }
-        let steps = dropped(log);
-        self.add_during(
-            &log.intervals(steps.iter().map(|step| step.row)),
-            if share > FEW_DROPPED { Warning } else { Info },
-            format!(
-                "{} row(s) are missing ({} of the number logged): the torque in between is unknown. Fits interpolate \
-                 it, and leave out steps in which it jumps; errors hold the last logged torque and therefore grow",
-                audit.dropped_rows,
-                percent(share)
-            ),
-        );
-    }
-
-    fn about_amount_of_motion(&mut self, audit: &Audit) {
-        let moving_s = |joint: &JointAudit| audit.duration_s * (1.0 - joint.share_at_rest);
-        let motion_s = audit.joints.iter().map(moving_s).fold(0.0, f64::max);
-        let severity = if motion_s < TOO_LITTLE_MOTION_S {
-            Serious
-        } else if motion_s < LITTLE_MOTION_S {
-            Warning
-        } else {
-            return;
-        };
-        self.add(
-            severity,
-            format!(
-                "only {} s of motion, {} intervals of half a second: too few to distinguish effects; add logs, or \
-                 record for longer",
-                short(motion_s),
-                (motion_s / 0.5).floor()
-            ),
-        );
-    }
-
-    fn about_excitation(&mut self, joint: &JointAudit) {
-        let name = &joint.q.name;
-        if joint.reversals == 0 {
-            self.add(
-                Warning,
-                format!(
-                    "{name} never reverses: dry friction cannot be distinguished from a constant torque; move in both \
-                     directions"
-                ),
-            );
-        }
-        if joint.share_at_rest > MUCH_REST {
-            self.add_during(
-                &joint.at_rest,
-                Info,
-                format!(
-                    "joint {} is at rest in {} of the rows",
-                    joint.joint,
-                    percent(joint.share_at_rest)
-                ),
-            );
-        }
-    }
-
-    fn about_angle(&mut self, joint: &JointAudit, log: &Log) {
-        let name = &joint.q.name;
-        if joint.repeated_fraction > MANY_REPEATS {
-            self.add_during(
-                &joint.repeated,
-                Serious,
-                format!(
-                    "{name} repeats the previous row in {} of the rows in motion: the log is written faster than the \
-                     encoder is read; keep only rows that differ",
-                    percent(joint.repeated_fraction)
-                ),
-            );
-        } else {
-            self.about_freezes(joint, log);
-        }
+/// How much a number of bad rows matters.
+fn spike_severity(spikes: usize, rows: usize) -> Severity {
+    match spikes as f64 / rows as f64 {
+        share if share > MANY_SPIKES => Serious,
+        share if share > SOME_SPIKES => Warning,
+        _ => Info,
     }
 }
 
 #[cfg(test)]
-pub(super) mod tests {
-    use super::super::tests::{audit, one_joint, swing};
+mod tests {
+    use super::super::tests::{audit, each, edited, one_joint, swing, uniform};
     use super::*;
 
-    /// Whether the audit has a finding of this severity that contains all the given words.
-    pub(in super::super) fn says(log: &Log, severity: Severity, words: &[&str]) -> bool {
-        let audit = audit(log);
-        let fits = |finding: &Finding| {
-            let remedy = finding.remedy.as_ref().map(ToString::to_string);
-            let whole = format!("{} {}", finding.text, remedy.unwrap_or_default());
-            finding.severity == severity && words.iter().all(|word| whole.contains(word))
-        };
-        audit.findings.iter().any(fits)
+    type Change = fn(&mut Log);
+
+    /// Changes of a good log, and the findings that they bring: severity, and parts of text and remedy.
+    const CASES: [(Change, &str); 24] = [
+        (ramp, "Warning: q1 never reverses"),
+        (ramp, "Warning: only 1.398 ... s of motion"),
+        (still, "Serious: joint 1 moves by 0 rad"),
+        (
+            pause,
+            "Warning: 1 gap(s), the longest of 0.202 s at t = 4.998 s ... rig.csv@4.998-",
+        ),
+        (drop_fifty, "Warning: 50 row(s) are missing ... 1.01 %"),
+        (
+            |log| log.notes.push("columns ignored".into()),
+            "Info: columns ignored",
+        ),
+        (
+            jump,
+            "Warning: q1 jumps in 1 single row(s) ... up to 50 rad ... rig.csv@2.999-3.017",
+        ),
+        (
+            freeze,
+            "Warning: q1 stays the same ... for up to 0.4 s, 1 time(s) ... rig.csv@2-2.4",
+        ),
+        (
+            |log| qd(log, |k, v| v + f64::from(k % 500 == 250) * 9.0),
+            "Warning: qd1 has 10 sample(s) ... up to 9",
+        ),
+        (
+            |log| qd(log, |_, v| 2.0 * v),
+            "Serious: qd1 is 2 times dq1/dt ... [columns] qd = []",
+        ),
+        (
+            |log| qd(log, |k, v| if k % 700 > 350 { v } else { -v }),
+            "Serious: qd1 does not follow dq1/dt ... qd = []",
+        ),
+        (
+            |log| qd(log, |_, _| 0.0),
+            "Serious: qd1 is 0 rad/s throughout ... qd = []",
+        ),
+        (
+            |log| qd(log, |_, v| v.to_degrees()),
+            "Serious: ... qd1 looks like deg/s ... qd = [{ column = \"qd1\", unit = \"deg/s\" }]",
+        ),
+        (
+            |log| qd(log, |_, v| -v),
+            "Serious: qd1 follows -dq1/dt ... qd = [{ column = \"qd1\", factor = -1 }]",
+        ),
+        (reverse, "Serious: ... tau1 has the opposite sign"),
+        (
+            chatter,
+            "Serious: tau1 chatters: 3 ... above 10.6 Hz ... 2 % of the rows ... smooth command",
+        ),
+        (
+            chatter,
+            "Warning: the motion explains ... of tau1 as logged ... fit trajectories",
+        ),
+        (
+            push,
+            "Warning: the motion explains ... something else moves the joint",
+        ),
+        // A second motion, as gravity would explain a single one.
+        (
+            |log| log.tau[0].rotate_left(5),
+            "Warning: the acceleration of joint 1 trails tau1 by ... shift the column",
+        ),
+        (
+            |log| tau(log, |_, _| 0.0),
+            "Info: ... passive rig ... ratios to the inertia",
+        ),
+        (
+            |log| tau(log, |_, _| 0.3),
+            "Warning: tau1 is 0.3 N m throughout",
+        ),
+        (
+            |log| tau(log, |_, nm| nm.abs()),
+            "Warning: tau1 never changes sign",
+        ),
+        (
+            |log| tau(log, |_, nm| nm.clamp(-9.0, 9.0)),
+            "Warning: tau1 sits at an end of its range (-9 to 9 N m)",
+        ),
+        (constant_command, "Warning: cmd1 is 0.3 throughout"),
+    ];
+
+    fn qd(log: &mut Log, value: impl Fn(usize, f64) -> f64) {
+        each(&mut log.qd[0], value);
     }
 
-    #[test]
-    fn a_good_log_draws_no_warning() {
-        let findings = audit(&swing()).findings;
-        assert!(
-            findings.iter().all(|finding| finding.severity == Info),
-            "{findings:?}"
-        );
+    fn tau(log: &mut Log, value: impl Fn(usize, f64) -> f64) {
+        each(&mut log.tau[0], value);
     }
 
-    #[test]
-    fn motions_that_show_little_are_named() {
-        let time: Vec<f64> = (0..700).map(|i| i as f64 * 0.002).collect();
-        let log = one_joint(time.clone(), time.clone(), vec![1.0; 700], time.clone());
-        assert!(says(&log, Warning, &["q1 never reverses"]));
-        assert!(says(&log, Warning, &["only 1.398", "s of motion"]));
-        let still = one_joint(time.clone(), vec![0.5; 700], vec![0.0; 700], time);
-        assert!(says(&still, Serious, &["joint 1 moves by 0 rad"]));
+    fn ramp(log: &mut Log) {
+        let time = uniform(700, 0.002);
+        *log = one_joint(time.clone(), time.clone(), vec![1.0; 700], time);
+    }
+
+    fn still(log: &mut Log) {
+        let time = uniform(700, 0.002);
+        *log = one_joint(time.clone(), vec![0.5; 700], vec![0.0; 700], time);
+    }
+
+    fn pause(log: &mut Log) {
+        each(&mut log.time[2500..], |_, t| t + 0.2);
+    }
+
+    fn drop_fifty(log: &mut Log) {
+        let kept = |k: usize| (100 * k).saturating_sub(49)..(100 * k + 50).min(5000);
+        *log = log.at(&(0..=50).map(kept).collect::<Vec<_>>());
+    }
+
+    fn jump(log: &mut Log) {
+        log.q[0][1500] += 50.0;
+    }
+
+    fn freeze(log: &mut Log) {
+        let held = log.q[0][1000];
+        log.q[0][1000..1200].fill(held);
+    }
+
+    fn rest(log: &mut Log) {
+        let held = log.q[0][1000];
+        log.q[0][1000..].fill(held);
+        log.qd[0][1000..].fill(0.0);
+    }
+
+    fn reverse(log: &mut Log) {
+        tau(log, |_, nm| -nm);
+    }
+
+    fn clip(log: &mut Log) {
+        log.tau[0][1000..1600].fill(40.0);
+    }
+
+    fn chatter(log: &mut Log) {
+        let fast = |k: usize| if k.is_multiple_of(2) { 30.0 } else { -30.0 };
+        let rare = |k: usize| if k.is_multiple_of(50) { 100.0 } else { 0.0 };
+        tau(log, |k, nm| nm + fast(k) + rare(k));
+    }
+
+    fn push(log: &mut Log) {
+        let push = |k: usize| 40.0 * (11.0 * 0.002 * k as f64).sin();
+        tau(log, |k, nm| if k > 1000 { nm + push(k) } else { nm });
+    }
+
+    fn constant_command(log: &mut Log) {
+        log.driven_by = Quantity::Command;
+        log.tau[0].fill(0.3);
+    }
+
+    /// Whether a finding begins with a severity and has all parts of a text.
+    fn fits(finding: &Finding, words: &str) -> bool {
+        let remedy = finding.remedy.as_ref().map(ToString::to_string);
+        let (severity, text) = (finding.severity, &finding.text);
+        let whole = format!("{severity:?}: {text} {}", remedy.unwrap_or_default());
+        words.split(" ... ").all(|part| whole.contains(part))
+    }
+
+    fn says(change: Change, words: &str) -> bool {
+        let findings = audit(&edited(change)).findings;
+        findings.iter().any(|finding| fits(finding, words))
     }
 
     /// The intervals of the finding that says this.
-    pub(super) fn spans(log: &Log, words: &str) -> Vec<[f64; 2]> {
-        let findings = audit(log).findings;
-        let mut said = findings
-            .iter()
-            .filter(|finding| finding.text.contains(words));
-        said.next()
-            .unwrap_or_else(|| panic!("{words}: {findings:?}"))
-            .spans_s
-            .clone()
+    fn spans(log: &Log, words: &str) -> Vec<[f64; 2]> {
+        let mut findings = audit(log).findings.into_iter();
+        let said = findings.find(|finding| fits(finding, words));
+        said.expect(words).spans_s
+    }
+
+    #[test]
+    fn a_fault_is_found_with_its_size_and_its_remedy() {
+        for (change, words) in CASES {
+            assert!(says(change, words), "{words}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_fault_is_not_reported() {
+        let good = audit(&swing()).findings;
+        assert!(
+            good.iter().all(|finding| finding.severity == Info),
+            "{good:?}"
+        );
+        let rest_then_move: Change = |log| {
+            let start = log.q[0][0];
+            log.q[0].rotate_right(1000);
+            log.q[0][..1000].fill(start);
+        };
+        assert!(!says(rest_then_move, "q1 stays the same"));
+        let reversed_command: Change = |log| {
+            reverse(log);
+            log.driven_by = Quantity::Command;
+        };
+        assert!(!says(reversed_command, "opposite sign"));
+        assert!(!says(jump, "Serious"), "a jump spoils no other finding");
     }
 
     #[test]
     fn what_belongs_to_a_part_of_a_log_says_from_when_to_when() {
-        let part = 1000..1600;
+        let drop: Change = |log| *log = log.at(&[0..2000, 2001..5000]);
+        let cases: [(Change, &str, [usize; 2], f64); 6] = [
+            (clip, "tau1 sits at an end", [1000, 1600], 0.05),
+            (rest, "at rest in", [1000, 4999], 0.05),
+            (drop, "1 row(s) are missing", [1999, 2001], 0.0),
+            (
+                |log| log.tau[0][700] += 500.0,
+                "tau1 has 1 single-row spike",
+                [700, 701],
+                0.0,
+            ),
+            (
+                |log| log.qd[0][900] += 9.0,
+                "qd1 has 1 sample(s)",
+                [900, 901],
+                0.0,
+            ),
+            (freeze, "q1 stays the same", [1000, 1200], 0.0),
+        ];
         let time = swing().time;
-        let near = |spans: &[[f64; 2]], from: usize, to: usize| {
-            let ends = [time[from], time[to]];
-            spans
-                .iter()
-                .any(|span| (0..2).all(|k| (span[k] - ends[k]).abs() < 0.05))
-        };
-        let mut clipped = swing();
-        clipped.tau[0][part.clone()].fill(40.0);
-        assert!(near(&spans(&clipped, "tau1 sits at an end"), 1000, 1600));
-        let mut stuck = swing();
-        let exact = stuck.q[0].clone();
-        (0..3000).for_each(|row| stuck.q[0][row] = exact[row - row % 2]);
-        // Except where the joint reverses.
-        let repeated = spans(&stuck, "q1 repeats the previous row");
-        let length_s: f64 = repeated.iter().map(|[start, end]| end - start).sum();
-        assert!(
-            length_s > 0.7 * 6.0 && repeated.iter().all(|span| span[1] < 6.05),
-            "{repeated:?}"
-        );
-        let mut resting = swing();
-        for row in 1000..5000 {
-            resting.q[0][row] = resting.q[0][1000];
-            resting.qd[0][row] = 0.0;
+        for (change, words, rows, within_s) in cases {
+            let is_off = |at: f64, row: usize| (at - time[row]).abs() > within_s;
+            let mut spans = spans(&edited(change), words).into_iter();
+            assert!(
+                spans.any(|[from, to]| !is_off(from, rows[0]) && !is_off(to, rows[1])),
+                "{words}"
+            );
         }
-        assert!(near(&spans(&resting, "at rest in"), 1000, 4999));
-        let mut thinned = swing();
-        for channel in [
-            &mut thinned.time,
-            &mut thinned.q[0],
-            &mut thinned.qd[0],
-            &mut thinned.tau[0],
-        ] {
-            channel.remove(2000);
-        }
-        let missing = spans(&thinned, "1 row(s) are missing");
-        assert_eq!(missing, [[time[1999], time[2001]]]);
-        let mut spiky = swing();
-        spiky.tau[0][700] += 500.0;
-        assert_eq!(
-            spans(&spiky, "tau1 has 1 single-row spike"),
-            [[time[700], time[701]]]
-        );
-        let mut off = swing();
-        off.qd[0][900] += 9.0;
-        let disagrees = spans(&off, "qd1 has 1 sample(s)");
-        assert_eq!(disagrees, [[time[900], time[901]]]);
-        let message = audit(&clipped).to_string();
-        let line = message.lines().find(|line| line.contains("t = 2 to 3.2 s"));
-        assert!(
-            line.is_some_and(|line| line.starts_with("         ")),
-            "{message}"
-        );
+        let message = audit(&edited(clip)).to_string();
+        assert!(message.contains("\n         t = 2 to 3.2 s"), "{message}");
     }
 
     #[test]
-    fn sampling_faults_come_with_their_remedy() {
-        let mut log = swing();
-        log.time.iter_mut().skip(2500).for_each(|t| *t += 0.2);
-        assert!(says(
-            &log,
-            Warning,
-            &[
-                "1 gap(s), the longest of 0.202 s at t = 4.998 s",
-                "rig.csv@4.998-"
-            ]
-        ));
-        let every = |row: &usize| row % 100 != 50;
-        let rows: Vec<usize> = (0..log.rows()).filter(every).collect();
-        let thinned = |values: &[f64]| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
-        let dropped = one_joint(
-            thinned(&log.time),
-            thinned(&log.q[0]),
-            thinned(&log.qd[0]),
-            thinned(&log.tau[0]),
+    fn a_logger_that_repeats_its_source_is_placed() {
+        let log = edited(|log| {
+            let exact = log.q[0].clone();
+            each(&mut log.q[0][..3000], |row, _| exact[row - row % 2]);
+        });
+        let spans = spans(&log, "q1 repeats the previous row");
+        // Except where the joint reverses.
+        let length_s: f64 = spans.iter().map(|[start, end]| end - start).sum();
+        assert!(
+            length_s > 0.7 * 6.0 && spans.iter().all(|span| span[1] < 6.05),
+            "{spans:?}"
         );
-        assert!(says(
-            &dropped,
-            Warning,
-            &["50 row(s) are missing", "1.01 %"]
-        ));
-        log.notes.push("columns ignored: \"mode\"".to_owned());
-        assert!(says(&log, Info, &["columns ignored"]));
     }
 }

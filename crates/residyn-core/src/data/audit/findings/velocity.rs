@@ -1,11 +1,8 @@
-//! Findings about a joint's logged velocity.
+//! Checks of a joint's logged velocity.
 
-use super::super::quality::Finding;
-use super::super::table::short;
-use super::super::{Audit, JointAudit, MAX_LAG_S, VelocityCheck};
 use super::Severity::{Info, Warning};
-use super::{Found, milliseconds, percent, spike_severity};
-use crate::data::Joint;
+use super::{Finding, JointAudit, Seen, percent, short, spike_severity};
+use crate::data::audit::MAX_LAG_S;
 
 /// A scale this far from 1 biases every rate-dependent effect by as much.
 const SCALE_OFF: f64 = 0.05;
@@ -16,82 +13,51 @@ const LAG_STEPS: f64 = 0.4;
 /// A longer lag comes from a filter or a bus, and pairs velocities with the wrong angles.
 const LONG_LAG_STEPS: f64 = 1.5;
 
-impl Found {
-    pub(super) fn about_velocity(&mut self, joint: &JointAudit, audit: &Audit) {
-        let (name, number) = (&joint.qd.name, joint.joint);
-        let Some(check) = joint.velocity else { return };
-        self.about_velocity_scale(name, number, check);
-        self.about_velocity_lag(name, number, check, audit.median_step_s);
-        if joint.qd.spikes > 0 {
-            self.about_velocity_spikes(joint, check, audit.examined_rows);
-        }
-    }
-
-    fn about_velocity_spikes(&mut self, joint: &JointAudit, check: VelocityCheck, rows: usize) {
-        let (name, number) = (&joint.qd.name, joint.joint);
-        // Never serious: fits read no velocities.
-        let severity = spike_severity(joint.qd.spikes, rows).max(Warning);
-        let text = format!(
-            "{name} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: they count in velocity \
-             errors; `qd = []` under [columns] takes velocities from q{number}",
-            joint.qd.spikes,
-            percent(joint.qd.spikes as f64 / rows as f64),
-            short(check.worst_rad_s)
-        );
-        let finding = Finding::new(severity, text).of(number);
-        self.0.push(finding.during(&joint.disagreeing));
-    }
-
-    fn about_velocity_scale(&mut self, name: &str, number: Joint, check: VelocityCheck) {
-        if (check.scale - 1.0).abs() > SCALE_OFF {
-            self.add(
-                Warning,
-                format!(
-                    "{name} is {} times dq{number}/dt: check its unit (rad/s) and gear ratio",
-                    short(check.scale)
-                ),
-            );
-        }
-    }
-
-    fn about_velocity_lag(&mut self, name: &str, number: Joint, check: VelocityCheck, step_s: f64) {
-        let steps = check.lag_s.abs() / step_s;
-        if steps < LAG_STEPS {
-            return;
-        }
-        let verb = if check.lag_s > 0.0 { "trails" } else { "leads" };
-        let bound = if check.lag_s.abs() >= MAX_LAG_S {
-            "at least "
-        } else {
-            ""
-        };
-        self.add(
-            if steps > LONG_LAG_STEPS { Warning } else { Info },
-            format!(
-                "{name} {verb} dq{number}/dt by {bound}{} ({} steps; a backward difference: 0.5): do \
-                 not pair it with q{number} of the same row",
-                milliseconds(check.lag_s.abs()),
-                short(steps)
-            ),
-        );
-    }
+pub(super) fn scale(joint: &JointAudit, _: &Seen<'_>) -> Option<Finding> {
+    let (name, number, scale) = (&joint.qd.name, joint.joint, joint.velocity?.scale);
+    let times = short(scale);
+    let text =
+        format!("{name} is {times} times dq{number}/dt: check its unit (rad/s) and gear ratio");
+    ((scale - 1.0).abs() > SCALE_OFF).then(|| Finding::new(Warning, text))
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::super::tests::swing;
-    use super::super::tests::says;
-    use super::*;
+pub(super) fn lag(joint: &JointAudit, seen: &Seen<'_>) -> Option<Finding> {
+    let (name, number, lag_s) = (&joint.qd.name, joint.joint, joint.velocity?.lag_s);
+    let (verb, late, steps) = super::lag(lag_s, seen.audit.median_step_s);
+    let bound = if lag_s.abs() >= MAX_LAG_S {
+        "at least "
+    } else {
+        ""
+    };
+    let text = format!(
+        "{name} {verb} dq{number}/dt by {bound}{late} ({} steps; a backward difference: 0.5): do not pair it with \
+         q{number} of the same row",
+        short(steps)
+    );
+    let severity = if steps > LONG_LAG_STEPS {
+        Warning
+    } else {
+        Info
+    };
+    (steps >= LAG_STEPS).then(|| Finding::new(severity, text))
+}
 
-    #[test]
-    fn velocities_that_disagree_in_single_rows_are_counted() {
-        let with_qd = |change: fn(usize, f64) -> f64| {
-            let mut log = swing();
-            let numbered = log.qd[0].iter_mut().enumerate();
-            numbered.for_each(|(row, value)| *value = change(row, *value));
-            log
-        };
-        let spiky = with_qd(|row, v| if row % 500 == 250 { v + 9.0 } else { v });
-        assert!(says(&spiky, Warning, &["qd1 has 10 sample(s)", "up to 9"]));
-    }
+pub(super) fn spikes(joint: &JointAudit, seen: &Seen<'_>) -> Option<Finding> {
+    let (qd, number, rows) = (&joint.qd, joint.joint, seen.audit.examined_rows);
+    let text = format!(
+        "{} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: they count in velocity errors; \
+         `qd = []` under [columns] takes velocities from q{number}",
+        qd.name,
+        qd.spikes,
+        percent(qd.spikes as f64 / rows as f64),
+        short(joint.velocity?.worst_rad_s)
+    );
+    // Never serious: fits read no velocities.
+    let severity = spike_severity(qd.spikes, rows).max(Warning);
+    let finding = || {
+        Finding::new(severity, text)
+            .of(number)
+            .during(&joint.disagreeing)
+    };
+    (qd.spikes > 0).then(finding)
 }

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::{Change, Misread, Reading, To};
 use crate::data::audit::JointAudit;
 use crate::data::audit::motion::Motion;
+use crate::data::audit::regression::Regression;
 use crate::data::audit::response::response;
 use crate::data::audit::table::short;
 use crate::data::column::Quantity;
@@ -20,59 +21,71 @@ const DEGREE: f64 = TAU / 360.0;
 
 pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
     // A motion of fewer degrees than a turn has radians is too small to distinguish the two.
-    let far = reading
-        .joints
-        .iter()
-        .filter(|joint| joint.moves() && joint.q.range() > TAU);
-    let far: Vec<&JointAudit> = far.collect();
-    if far.is_empty() {
+    let is_far = |joint: &&JointAudit| joint.moves() && joint.q.range() > TAU;
+    let mut far = reading.joints.iter().filter(is_far).peekable();
+    if far.peek().is_none() {
         return vec![];
     }
-    let changes = |joint: &JointAudit| {
-        let change = |quantity, unit| Change {
-            quantity,
-            joint: Some(joint.joint),
-            to: To::Unit(unit),
-        };
-        vec![
-            change(Quantity::Angle, "deg"),
-            change(Quantity::Velocity, "deg/s"),
-        ]
-    };
     let in_degrees = reading.motions.iter().map(|motion| motion.scaled(DEGREE));
     let in_degrees: Vec<Motion> = in_degrees.collect();
     let fast = reading.joints.iter();
     let fast: Vec<f64> = fast.map(|joint| DEGREE * joint.fast_rad_s).collect();
-    let left = |audit: &JointAudit| {
-        let in_degrees = response(&in_degrees, &fast, audit.joint)?;
-        Some((1.0 - audit.response?.explained, 1.0 - in_degrees.explained))
-    };
-    let is_beyond_doubt = |audit: &&JointAudit| {
-        let is_much_better = |(radians, degrees): (f64, f64)| {
-            degrees < MUCH_BETTER * radians && degrees < radians - MUCH_MORE
-        };
-        left(audit).is_some_and(is_much_better)
-    };
-    // One program writes all joints: if one is in degrees, so is every other joint that looks no worse in degrees.
-    let any = far.iter().any(is_beyond_doubt);
-    let misread = |audit: &&JointAudit| {
-        let (radians, degrees) = left(audit)?;
-        (any && degrees <= radians).then(|| {
-            let q = &audit.q.name;
-            Misread {
-                joint: Some(audit.joint),
-                text: format!(
-                    "{q} covers {} rad and reaches {} rad/s, and torque, gravity and friction explain {} % of its \
-                     acceleration; with {q} in degrees they explain {} %: {q} and {} look like deg and deg/s",
-                    short(audit.q.range()),
-                    short(audit.fast_rad_s),
-                    short(100.0 * (1.0 - radians)),
-                    short(100.0 * (1.0 - degrees)),
-                    audit.qd.name
-                ),
-                changes: changes(audit),
-            }
+    let judged = far.filter_map(|audit| {
+        let in_degrees = response(&Regression::of(&in_degrees, &fast, audit.joint)?)?;
+        Some(Judged {
+            audit,
+            radians: 1.0 - audit.response?.explained,
+            degrees: 1.0 - in_degrees.explained,
         })
-    };
-    far.iter().filter_map(misread).collect()
+    });
+    let judged: Vec<Judged<'_>> = judged.collect();
+    // One program writes all joints: if one is in degrees, so is every other joint that looks no worse in degrees.
+    if !judged.iter().any(Judged::is_beyond_doubt) {
+        return vec![];
+    }
+    let no_worse = judged.iter().filter(|joint| joint.degrees <= joint.radians);
+    no_worse.map(Judged::misread).collect()
+}
+
+/// A joint, and the shares of its acceleration's variance that regressions leave in either unit.
+struct Judged<'a> {
+    audit: &'a JointAudit,
+    radians: f64,
+    degrees: f64,
+}
+
+impl Judged<'_> {
+    fn is_beyond_doubt(&self) -> bool {
+        let Self {
+            radians, degrees, ..
+        } = *self;
+        degrees < MUCH_BETTER * radians && degrees < radians - MUCH_MORE
+    }
+
+    fn misread(&self) -> Misread {
+        let JointAudit { joint, q, qd, .. } = self.audit;
+        let change = |quantity, unit| Change {
+            quantity,
+            joint: Some(*joint),
+            to: To::Unit(unit),
+        };
+        let text = format!(
+            "{0} covers {1} rad and reaches {2} rad/s, and torque, gravity and friction explain {3} % of its \
+             acceleration; with {0} in degrees they explain {4} %: {0} and {5} look like deg and deg/s",
+            q.name,
+            short(q.range()),
+            short(self.audit.fast_rad_s),
+            short(100.0 * (1.0 - self.radians)),
+            short(100.0 * (1.0 - self.degrees)),
+            qd.name
+        );
+        Misread {
+            joint: Some(*joint),
+            text,
+            changes: vec![
+                change(Quantity::Angle, "deg"),
+                change(Quantity::Velocity, "deg/s"),
+            ],
+        }
+    }
 }

@@ -11,7 +11,7 @@ mod velocity;
 
 use std::borrow::Cow;
 
-use super::joint::{JointAudit, with_motions};
+use super::joint::{JointAudit, audit_joints};
 use super::motion::Motion;
 use super::quality::{Finding, Remedy, Severity};
 use super::table::short;
@@ -52,31 +52,35 @@ enum To {
     Derived,
 }
 
-/// What is misread in a log, as findings, and the log as it is meant.
-pub(super) fn as_meant<'l>(log: &'l Log, columns: &Columns) -> (Reading<'l>, Vec<Finding>) {
-    let mut reading = Reading::of(Cow::Borrowed(log));
-    let mut found = vec![];
-    for look in [
-        turns::misread,
-        time::misread,
-        velocity::misread,
-        degrees::misread,
-        sign::misread,
-    ] {
-        let misread = look(&reading);
+/// The kinds, in the order in which they are checked.
+const KINDS: [fn(&Reading<'_>) -> Vec<Misread>; 5] = [
+    turns::misread,
+    time::misread,
+    velocity::misread,
+    degrees::misread,
+    sign::misread,
+];
+
+/// What is misread in a log, as findings, and the log as it is meant, if that differs.
+pub(super) fn as_meant<'l>(
+    read: &Reading<'l>,
+    columns: &Columns,
+) -> (Option<Reading<'l>>, Vec<Finding>) {
+    let (mut meant, mut found) = (None, vec![]);
+    for kind in KINDS {
+        let reading: &Reading<'l> = meant.as_ref().unwrap_or(read);
+        let misread = kind(reading);
         if misread.is_empty() {
             continue;
         }
-        let mut log = reading.log.into_owned();
-        misread
-            .iter()
-            .flat_map(|one| &one.changes)
-            .for_each(|change| change.apply(&mut log));
-        reading = Reading::of(Cow::Owned(log));
+        let mut log = (*reading.log).clone();
+        let changes = misread.iter().flat_map(|one| &one.changes);
+        changes.for_each(|change| change.apply(&mut log));
+        meant = Some(Reading::of(Cow::Owned(log)));
         found.extend(misread);
     }
-    let findings = with_remedies(&found, columns, log.joints());
-    (reading, findings)
+    let findings = with_remedies(&found, columns, read.log.joints());
+    (meant, findings)
 }
 
 /// The finding that all torques or commands have the opposite sign: reversed, they leave the declared model this share
@@ -106,8 +110,8 @@ pub fn reversed_driving(
 }
 
 impl<'l> Reading<'l> {
-    fn of(log: Cow<'l, Log>) -> Self {
-        let (joints, motions) = with_motions(&log);
+    pub fn of(log: Cow<'l, Log>) -> Self {
+        let (joints, motions) = audit_joints(&log);
         Self {
             log,
             joints,

@@ -6,6 +6,7 @@ use super::{Change, Misread, Reading, To};
 use crate::data::audit::table::short;
 use crate::data::column::Quantity;
 use crate::data::signal::differences;
+use crate::data::statistics::ends;
 use crate::data::{Joint, Log};
 
 /// From one row to the next, a joint turns by at most this share of a turn, or by at most twice its larger neighbouring
@@ -19,10 +20,8 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
     let log: &Log = &reading.log;
     let of_joint = |joint: Joint| {
         let angles = &log.q[joint];
-        let degrees = || Some((360.0, passings(angles, 360.0)?));
-        let (turn, rows) = passings(angles, TAU)
-            .map(|rows| (TAU, rows))
-            .or_else(degrees)?;
+        let passed = |turn| Some((turn, passings(angles, turn)?));
+        let (turn, rows) = [TAU, 360.0].into_iter().find_map(passed)?;
         let change = |to| Change {
             quantity: Quantity::Angle,
             joint: Some(joint),
@@ -48,8 +47,7 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
 /// The rows after which an angle passes the end of a turn of this length; `None` if it never does, or does not stay
 /// within one turn.
 fn passings(angles: &[f64], turn: f64) -> Option<Vec<usize>> {
-    let highest = angles.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let lowest = angles.iter().copied().fold(f64::INFINITY, f64::min);
+    let [lowest, highest] = ends(angles);
     if highest - lowest > turn * (1.0 + ROUNDING) {
         return None;
     }
@@ -83,16 +81,12 @@ mod tests {
     fn a_turn_that_starts_anew_is_told_from_one_that_is_counted() {
         let angles = turning();
         assert_eq!(passings(&angles, TAU), None);
-        let wrapped: Vec<f64> = angles
-            .iter()
-            .map(|a| (a + 1.0).rem_euclid(TAU) - 1.0)
-            .collect();
+        let wrapped = angles.iter().map(|a| (a + 1.0).rem_euclid(TAU) - 1.0);
+        let wrapped: Vec<f64> = wrapped.collect();
         assert!(passings(&wrapped, TAU).unwrap().len() >= 6);
         let degrees: Vec<f64> = wrapped.iter().map(|a| a.to_degrees()).collect();
-        assert_eq!(
-            (passings(&degrees, TAU), passings(&degrees, 360.0).is_some()),
-            (None, true)
-        );
+        assert_eq!(passings(&degrees, TAU), None);
+        assert!(passings(&degrees, 360.0).is_some());
     }
 
     #[test]
