@@ -62,7 +62,8 @@ pub use residyn_core::model::{Effect, Library, Model, Origin, Parameter};
 pub use residyn_core::rng;
 pub use residyn_core::sim::metric::Trace;
 pub use residyn_io::{
-    read_log, read_logs, read_model, read_plant, read_standard_log, with_effects_in, write_log,
+    read_log, read_log_from, read_logs, read_model, read_plant, read_standard_log, with_effects_in,
+    write_log,
 };
 #[cfg(feature = "train")]
 #[doc(inline)]

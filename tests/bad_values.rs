@@ -512,7 +512,7 @@ fn what_never_begins_or_never_ends_is_no_input() {
         }
     }
     says(
-        &refuses(&["audit", "-"]),
+        &refuses(&["evaluate", "--model", "pendulum", "--test", "-"]),
         &["-: ", "standard input is not read", "write it to a file"],
     );
 }

@@ -4,6 +4,7 @@
 use std::f64::consts::{PI, TAU};
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use residyn::read_model;
 use residyn::read_standard_log;
@@ -445,6 +446,20 @@ fn a_log_too_short_for_any_test_says_what_to_give() {
     let desk = Desk::with(|log| *log = thinned(log, |row| row > 60));
     let message = desk.closed(refuses);
     assert!(message.contains("--test"), "{message}");
+}
+
+#[test]
+fn a_log_may_come_from_standard_input() {
+    let desk = Desk::with(|_| ());
+    let piped = fs::File::open(desk.path("run.csv")).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_residyn"));
+    let output = command.args(["audit", "--json", "-"]).stdin(piped).output();
+    let audits: Value = serde_json::from_slice(&output.unwrap().stdout).unwrap();
+    let rows = read_standard_log(desk.path("run.csv")).unwrap().rows();
+    assert_eq!(
+        (&audits[0]["log"], &audits[0]["rows"]),
+        (&"-".into(), &rows.into())
+    );
 }
 
 /// Whether the audit calls a column of a log misread.

@@ -1,4 +1,5 @@
-use std::path::PathBuf;
+use std::io::stdin;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
@@ -6,7 +7,7 @@ use clap::Args;
 use super::{Answer, Common, inputs, remedy, terminal};
 use residyn_core::data::{Audit, Columns, Log, Severity, audit_together, report_repeats};
 use residyn_core::model::Library;
-use residyn_io::{read_logs, read_model, read_standard_log};
+use residyn_io::{read_log, read_log_from, read_model, read_standard_log, read_standard_log_from};
 
 /// Audit logs: units, signs, sampling, noise, jumps, lags, excitation, what they cannot show, and how to fix them
 #[derive(Debug, Args)]
@@ -18,7 +19,7 @@ pub(super) struct Arguments {
     /// assumed
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Logs to audit
+    /// Logs to audit; `-` for one from standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     #[command(flatten)]
@@ -56,10 +57,22 @@ fn headline(audit: &Audit) -> String {
 
 /// The logs and what their columns are.
 fn read(arguments: &Arguments) -> Result<(Vec<Log>, Columns)> {
+    let logs = arguments.logs.iter();
     let Some(model) = &arguments.model else {
-        let logs = arguments.logs.iter().map(read_standard_log);
+        let logs = logs.map(|path| match is_standard_input(path) {
+            true => read_standard_log_from(stdin().lock(), "-"),
+            false => read_standard_log(path),
+        });
         return Ok((logs.collect::<Result<_, _>>()?, Columns::default()));
     };
     let model = read_model(model, &Library::built_in())?;
-    Ok((read_logs(&arguments.logs, &model)?, model.columns))
+    let logs = logs.map(|path| match is_standard_input(path) {
+        true => read_log_from(stdin().lock(), "-", &model),
+        false => read_log(path, &model),
+    });
+    Ok((logs.collect::<Result<_, _>>()?, model.columns))
+}
+
+fn is_standard_input(path: &Path) -> bool {
+    path.as_os_str() == "-"
 }

@@ -11,7 +11,8 @@ mod table;
 
 pub use guarded::guarded;
 pub use log_file::{
-    WriteLogError, read_log, read_logs, read_rig_log, read_standard_log, write_log,
+    WriteLogError, read_log, read_log_from, read_logs, read_rig_log, read_standard_log,
+    read_standard_log_from, write_log,
 };
 pub use model_file::{effect_files, read_effect, read_model, with_effects_in};
 pub use plant_file::{plant_from_text, read_plant};

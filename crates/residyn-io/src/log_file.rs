@@ -1,13 +1,14 @@
 //! Logs as files.
 
+use std::io::Read;
 use std::path::Path;
 
-use residyn_core::data::{Columns, Log, LogError};
+use residyn_core::data::{Columns, Log, LogError, Table};
 use residyn_core::model::Model;
 use thiserror::Error;
 
 use crate::files::{OutputError, write_with};
-use crate::table::open;
+use crate::table::{open, open_reader};
 
 /// Reads a log of the rig that a model describes from a file, or a folder, in any supported format.
 ///
@@ -29,6 +30,31 @@ pub fn read_logs<P: AsRef<Path>>(
     logs.collect()
 }
 
+/// Reads a log of the rig that a model describes from anything that can be read, such as standard input or a download;
+/// `name` is for messages and the report.
+///
+/// It is held in memory, up to 1 GB. It may be a text or a MATLAB file, packed with gzip or not; other formats are read
+/// from files only.
+///
+/// ```
+/// use residyn_core::model::Library;
+/// use residyn_io::read_log_from;
+///
+/// let model = Library::built_in().model("pendulum")?;
+/// let text = "time,q1,qd1,tau1\n0,0.1,0,0\n0.01,0.1,0,0.2\n"; // or std::io::stdin().lock()
+/// let log = read_log_from(text.as_bytes(), "swing", &model)?;
+/// assert_eq!((log.name(), log.rows()), ("swing".to_owned(), 2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// A reader that fails or has more, and what [`Log::of_table`] refuses.
+pub fn read_log_from(reader: impl Read, name: &str, model: &Model) -> Result<Log, LogError> {
+    let path = Path::new(name);
+    let table = |columns: &Columns| open_reader(path, reader, columns);
+    rig_log(path, model.joints, &model.columns, table)
+}
+
 /// Reads one trajectory of a rig with `joints` joints: see [`Log::of_table`].
 ///
 /// # Errors
@@ -39,8 +65,18 @@ pub fn read_rig_log(
     columns: &Columns,
 ) -> Result<Log, LogError> {
     let path = path.as_ref();
+    rig_log(path, joints, columns, |columns| open(path, columns))
+}
+
+/// One trajectory from the table that `open` finds for the columns.
+fn rig_log(
+    path: &Path,
+    joints: usize,
+    columns: &Columns,
+    open: impl FnOnce(&Columns) -> Result<Box<dyn Table>, LogError>,
+) -> Result<Log, LogError> {
     let columns = columns.completed(joints, path)?;
-    Log::of_table(path, open(path, &columns)?.as_mut(), joints, &columns)
+    Log::of_table(path, open(&columns)?.as_mut(), joints, &columns)
 }
 
 /// Reads a file with the standard columns, with as many joints as its header has, in the header's order if they have
@@ -51,6 +87,18 @@ pub fn read_rig_log(
 pub fn read_standard_log(path: impl AsRef<Path>) -> Result<Log, LogError> {
     let path = path.as_ref();
     Log::of_standard_table(path, open(path, &Columns::default())?.as_mut())
+}
+
+/// Reads what a reader has as [`read_standard_log`] reads a file, under the conditions of [`read_log_from`].
+///
+/// # Errors
+/// As [`read_log_from`].
+pub fn read_standard_log_from(reader: impl Read, name: &str) -> Result<Log, LogError> {
+    let path = Path::new(name);
+    Log::of_standard_table(
+        path,
+        open_reader(path, reader, &Columns::default())?.as_mut(),
+    )
 }
 
 /// Why a log could not be written.
@@ -78,22 +126,20 @@ pub fn write_log(log: &Log, path: impl AsRef<Path>) -> Result<(), WriteLogError>
 #[cfg(test)]
 mod tests {
     use std::fs;
+    use std::io::Write;
 
-    use residyn_core::data::{Column, Quantity};
+    use residyn_core::data::Column;
 
     use super::*;
-    use crate::table::{Csv, Source};
 
     fn read(text: &str, joints: usize) -> Result<Log, LogError> {
         read_as(text, joints, &Columns::default())
     }
 
     fn read_as(text: &str, joints: usize, columns: &Columns) -> Result<Log, LogError> {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        fs::write(&file, text).unwrap();
         let path = Path::new("rig.csv");
-        let mut table = Csv::of(path, Source::of(file.path())?)?;
-        Log::of_table(path, &mut table, joints, columns)
+        let table = |columns: &Columns| open_reader(path, text.as_bytes(), columns);
+        rig_log(path, joints, columns, table)
     }
 
     fn message(text: &str) -> String {
@@ -111,13 +157,26 @@ mod tests {
     }
 
     #[test]
-    fn a_byte_order_mark_is_no_part_of_the_first_name() {
-        let path = tempfile::NamedTempFile::new().unwrap().into_temp_path();
-        fs::write(&path, "\u{feff}time,q1,qd1,tau1\n0,1,2,3\n1,1,2,3\n").unwrap();
+    fn a_reader_has_a_log_packed_or_not_but_no_archive() {
+        let text = b"time,q1,qd1,tau1\n0,1,2,3\n1,1,2,3\n";
+        let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        packer.write_all(text).unwrap();
+        let log = read_standard_log_from(&*packer.finish().unwrap(), "rig.csv.gz").unwrap();
+        assert_eq!(log.time, [0.0, 1.0]);
+        let archive: &[u8] = b"PK\x03\x04";
+        let refused = read_standard_log_from(archive, "-")
+            .unwrap_err()
+            .to_string();
         assert_eq!(
-            read_rig_log(&path, 1, &Columns::default()).unwrap().rows(),
-            2
+            refused,
+            "-: its format is read from files only; write it to a file"
         );
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_the_first_name() {
+        let text = "\u{feff}time,q1,qd1,tau1\n0,1,2,3\n1,1,2,3\n";
+        assert_eq!(read(text, 1).unwrap().rows(), 2);
     }
 
     #[test]
@@ -235,9 +294,8 @@ mod tests {
 
     #[test]
     fn bytes_that_are_not_text_are_placed() {
-        let path = tempfile::NamedTempFile::new().unwrap().into_temp_path();
-        fs::write(&path, b"time,q1,qd1,tau1\n0,0,0,\xff\n").unwrap();
-        let error = read_rig_log(&path, 1, &Columns::default()).unwrap_err();
+        let bytes: &[u8] = b"time,q1,qd1,tau1\n0,0,0,\xff\n";
+        let error = read_standard_log_from(bytes, "rig.csv").unwrap_err();
         assert!(error.to_string().contains("line 2: not UTF-8"), "{error}");
     }
 
@@ -262,11 +320,7 @@ mod tests {
             q: vec![vec![1.0, -1e-300, 3.5], vec![0.1, 0.2, 1.0 / 3.0]],
             qd: vec![vec![0.0; 3], vec![1e22, 0.0, -7.25]],
             tau: vec![vec![0.0; 3], vec![0.5; 3]],
-            driven_by: Quantity::Torque,
-            masked: vec![vec![]; 2],
-            filled: vec![],
-            leave_out: vec![],
-            notes: vec![],
+            ..Log::empty(2)
         }
     }
 

@@ -16,10 +16,11 @@ mod parquet;
 mod recording;
 mod source;
 
+use std::io::Read;
 use std::path::Path;
 
-pub(super) use self::csv::Csv;
-pub(super) use self::source::Source;
+use self::csv::Csv;
+use self::source::Source;
 use residyn_core::data::{Columns, LogError, Table};
 
 use crate::guarded::guarded;
@@ -30,6 +31,9 @@ const ZIP: &[u8] = b"PK\x03\x04";
 const PARQUET: &[u8] = b"PAR1";
 const SQLITE: &[u8] = b"SQLite format 3\0";
 const MCAP: &[u8] = b"\x89MCAP0\r\n";
+
+/// The formats that are read here and there, from files only.
+const FROM_FILES: [&[u8]; 4] = [ZIP, PARQUET, SQLITE, MCAP];
 
 /// Formats that are recognised but not read: their first bytes, and the line that converts them.
 const FOREIGN: [(&[u8], &str); 7] = [
@@ -72,11 +76,29 @@ const FOREIGN: [(&[u8], &str); 7] = [
 /// # Errors
 /// A file that cannot be read, that is of none of the formats, or that has too many columns.
 pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
-    let damaged = || {
-        let fault = "is damaged: its offsets and lengths contradict each other; write it again";
-        LogError::form(path, fault)
-    };
-    let table = guarded(|| read(path, columns)).ok_or_else(damaged)??;
+    checked(path, || in_file(path, columns))
+}
+
+/// The table that a reader has: a text or a MATLAB file, packed with gzip or not. `name` is for messages.
+///
+/// # Errors
+/// A reader that fails, a format that is read from files only, or one of those of [`open`].
+pub(super) fn open_reader(
+    name: &Path,
+    reader: impl Read,
+    columns: &Columns,
+) -> Result<Box<dyn Table>, LogError> {
+    let source = Source::held(name, reader)?;
+    checked(name, || in_source(name, source, columns))
+}
+
+/// A table with columns that are not too many, from a format's reader, which may panic on a damaged file.
+fn checked(
+    path: &Path,
+    read: impl FnOnce() -> Result<Box<dyn Table>, LogError>,
+) -> Result<Box<dyn Table>, LogError> {
+    let damaged = "is damaged: its offsets and lengths contradict each other; write it again";
+    let table = guarded(read).ok_or_else(|| LogError::form(path, damaged))??;
     let found = table.names().len();
     if found > LOG_COLUMNS {
         let fault = format!("has {found} columns; at most {LOG_COLUMNS} are read");
@@ -85,7 +107,7 @@ pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, Log
     Ok(table)
 }
 
-fn read(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
+fn in_file(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
     #[cfg(feature = "parquet")]
     if let Some(episode) = lerobot::Episode::of(path) {
         return Ok(Box::new(episode.read()?));
@@ -93,10 +115,13 @@ fn read(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
     if path.is_dir() {
         return Ok(Box::new(recording::of_folder(path, columns)?));
     }
-    let source = Source::of(path)?;
-    let begin = source.begin()?;
+    in_source(path, Source::of(path)?, columns)
+}
+
+fn in_source(name: &Path, source: Source, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
+    let begin = source.begin(name)?;
     // Recordings may be larger than the memory: they are not read at once.
-    if !source.is_packed() {
+    if let Some(path) = source.plain_file() {
         if begin.starts_with(SQLITE) {
             return Ok(Box::new(recording::of_bag(path, columns)?));
         }
@@ -110,12 +135,17 @@ fn read(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
         if begin.starts_with(PARQUET) {
             return Ok(Box::new(parquet::read(path)?));
         }
+    } else if !source.is_packed() && FROM_FILES.iter().any(|known| begin.starts_with(known)) {
+        return Err(LogError::form(
+            name,
+            "its format is read from files only; write it to a file",
+        ));
     }
     if let Some((_, remedy)) = FOREIGN.iter().find(|(known, _)| begin.starts_with(known)) {
-        return Err(LogError::form(path, *remedy));
+        return Err(LogError::form(name, *remedy));
     }
     if begin.starts_with(mat::MAGIC) {
-        return Ok(Box::new(mat::read(path, &source)?));
+        return Ok(Box::new(mat::read(name, &source)?));
     }
-    Ok(Box::new(Csv::of(path, source)?))
+    Ok(Box::new(Csv::of(name, source)?))
 }
