@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::column::{Column, Quantity};
 use super::error::{LogError, Place};
+use super::joint::Joint;
 use crate::expr::listed;
 
 /// Columns in which a log file holds time, angles, velocities and torques, and their units.
@@ -55,27 +56,40 @@ impl Columns {
         }
     }
 
+    /// The columns of a quantity, one for each joint except for the time.
+    fn of(&self, quantity: Quantity) -> &[Column] {
+        match quantity {
+            Quantity::Time => std::slice::from_ref(&self.time),
+            Quantity::Angle => &self.q,
+            Quantity::Velocity => self.qd.as_deref().unwrap_or_default(),
+            Quantity::Torque | Quantity::Command => &self.tau,
+        }
+    }
+
+    pub(super) fn of_mut(&mut self, quantity: Quantity) -> &mut [Column] {
+        match quantity {
+            Quantity::Time => std::slice::from_mut(&mut self.time),
+            Quantity::Angle => &mut self.q,
+            Quantity::Velocity => self.qd.as_deref_mut().unwrap_or_default(),
+            Quantity::Torque | Quantity::Command => &mut self.tau,
+        }
+    }
+
     /// All columns: time, angles, velocities, torques.
     pub(crate) fn in_file_order(&self) -> impl Iterator<Item = &Column> {
-        std::iter::once(&self.time)
-            .chain(&self.q)
-            .chain(self.qd.iter().flatten())
-            .chain(&self.tau)
+        let quantities = [Quantity::Time, Quantity::Angle, Quantity::Velocity];
+        let all = quantities.into_iter().chain([self.driven_by]);
+        all.flat_map(move |quantity| self.of(quantity))
     }
 
     /// The line of a model file under `[columns]` for one of the quantities: `tau = [{ column = "tau1", factor = -1 }]`.
     pub fn line(&self, quantity: Quantity) -> String {
-        let list = |columns: &[Column]| {
-            let columns: Vec<String> = columns.iter().map(Column::to_string).collect();
-            format!("[{}]", columns.join(", "))
-        };
-        let value = match quantity {
-            Quantity::Time => self.time.to_string(),
-            Quantity::Angle => list(&self.q),
-            Quantity::Velocity => list(self.qd.as_deref().unwrap_or_default()),
-            Quantity::Torque | Quantity::Command => list(&self.tau),
-        };
-        format!("{} = {value}", quantity.key())
+        let columns: Vec<String> = self.of(quantity).iter().map(Column::to_string).collect();
+        let (key, columns) = (quantity.key(), columns.join(", "));
+        match quantity {
+            Quantity::Time => format!("{key} = {columns}"),
+            _ => format!("{key} = [{columns}]"),
+        }
     }
 
     /// These columns with every empty list filled with the standard names; `None` if a list has another length.
@@ -121,22 +135,18 @@ impl Columns {
     /// header has that. A single joint may be the header's only named one, or have no name: `q` for `q1`.
     fn renamed_for(mut self, header: &[String]) -> Columns {
         let single = self.q.len() == 1;
-        if let (true, [], [joint]) = (single, &*self.joint_names, &*joints(header)) {
-            self.joint_names = vec![(*joint).to_owned()];
+        let mut names = self.joint_names.clone();
+        if let (true, [], [joint]) = (single, &*names, &*joints(header)) {
+            names = vec![(*joint).to_owned()];
         }
         let has = |name: &String| header.contains(name);
-        let lists = [
-            ("q", Some(&mut self.q)),
-            ("qd", self.qd.as_mut()),
-            (self.driven_by.key(), Some(&mut self.tau)),
-        ];
-        for (stem, list) in lists {
-            for (joint, column) in list.into_iter().flatten().enumerate() {
+        for quantity in [Quantity::Angle, Quantity::Velocity, self.driven_by] {
+            let stem = quantity.key();
+            for (joint, column) in self.of_mut(quantity).iter_mut().enumerate() {
                 if column.name != format!("{stem}{}", joint + 1) || has(&column.name) {
                     continue;
                 }
-                let by_joint = self.joint_names.get(joint);
-                let by_joint = by_joint.map(|name| format!("{stem}_{name}"));
+                let by_joint = names.get(joint).map(|name| format!("{stem}_{name}"));
                 let alone = single.then(|| stem.to_owned());
                 if let Some(name) = by_joint.into_iter().chain(alone).find(has) {
                     column.name = name;
@@ -154,10 +164,8 @@ pub(super) fn joints(header: &[String]) -> Vec<&str> {
 }
 
 fn numbered(prefix: &str, joints: usize) -> Vec<Column> {
-    let joints = 1..=joints;
-    joints
-        .map(|joint| Column::named(format!("{prefix}{joint}")))
-        .collect()
+    let name = |joint: Joint| Column::named(joint.name(prefix));
+    Joint::all(joints).map(name).collect()
 }
 
 /// Where one column of a channel stands in a row, and how its numbers are converted.
@@ -326,24 +334,17 @@ impl Header<'_> {
                 joints[0]
             );
         }
-        let nearest = free
-            .iter()
-            .map(|name| (likeness(name, wanted), name))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .filter(|(likeness, _)| *likeness >= 0.5)
-            .map(|(_, name)| name);
+        let scored = free.iter().map(|name| (likeness(name, wanted), name));
+        let nearest = scored.max_by(|a, b| a.0.total_cmp(&b.0));
+        let nearest = nearest.filter(|(likeness, _)| *likeness >= 0.5);
+        let nearest = nearest.map(|(_, name)| name);
         let example = nearest.map_or("NAME", String::as_str);
         let entry = match quantity {
             Quantity::Time => format!("time = {example:?}"),
             Quantity::Velocity => {
                 format!("qd = [{example:?}], or qd = [] to take velocities from the angles")
             }
-            Quantity::Torque
-                if self
-                    .names
-                    .iter()
-                    .any(|name| name == "cmd1" || name.starts_with("cmd_")) =>
-            {
+            Quantity::Torque if self.names.iter().any(|name| is_command(name)) => {
                 return "the log has commands, cmd1: say in [drive] of the model file which torque they produce, for \
                         instance tau1 = \"kp*(cmd1 - q1) - kd*qd1\"; `residyn list drives` shows ready-made drives"
                     .to_owned();
@@ -365,6 +366,10 @@ impl Header<'_> {
         let unused = self.names.iter().filter(|name| !used(name));
         unused.cloned().collect()
     }
+}
+
+fn is_command(name: &str) -> bool {
+    name == "cmd1" || name.starts_with("cmd_")
 }
 
 /// 1 for the same name up to case, 0 for nothing in common; a swap of neighbours (`dq1` for `qd1`) counts as one
@@ -402,6 +407,17 @@ mod tests {
             .to_string()
     }
 
+    /// The places of the channels, each with the standard unit.
+    fn places(header: &str, joints: usize, columns: &Columns) -> [Option<Vec<usize>>; 3] {
+        let found = layout(header, joints, columns).unwrap();
+        let places = |cells: Vec<Cell>| {
+            let as_is = cells.iter().all(|found| *found == cell(found.index));
+            assert!(as_is, "{cells:?}");
+            cells.iter().map(|cell| cell.index).collect()
+        };
+        [Some(found.q), found.qd, found.tau].map(|cells| cells.map(places))
+    }
+
     #[test]
     fn order_is_free_and_extra_columns_are_named() {
         let found = layout("tau1,note,qd1,q1,time", 1, &Columns::default()).unwrap();
@@ -416,34 +432,52 @@ mod tests {
     }
 
     #[test]
-    fn a_near_name_is_suggested_with_its_mapping() {
-        assert_eq!(
-            message("time,q1,dq1,tau1", 1),
-            "rig.csv, line 1: there is no column \"qd1\"; did you mean \"dq1\"? Rename it, or name it \
-             under [columns] in the model file: qd = [\"dq1\"], or qd = [] to take velocities from the angles"
-        );
-        assert!(
-            message("Time,q1,qd1,tau1", 1).ends_with("in the model file: time = \"Time\""),
-            "{}",
-            message("Time,q1,qd1,tau1", 1)
-        );
-        assert!(message("time,angle,qd1", 1).contains("the header has time, angle, qd1."));
-    }
-
-    #[test]
-    fn another_number_of_joints_is_told_as_such() {
-        let more = message("time,q1,q2,qd1,qd2,tau1,tau2", 1);
-        assert!(
-            more.contains("has 2 joint(s) (q1 to q2) but the model has 1"),
-            "{more}"
-        );
-        let fewer = message("time,q1,qd1,tau1", 2);
-        assert!(
-            fewer.contains("has 1 joint(s) (q1 to q1) but the model has 2"),
-            "{fewer}"
-        );
-        let misspelt = message("time,q1,Q2,qd1,qd2,tau1,tau2", 2);
-        assert!(misspelt.contains("did you mean \"Q2\"?"), "{misspelt}");
+    fn a_header_that_does_not_fit_says_why_and_what_to_do() {
+        let cases = [
+            (
+                "time,q1,dq1,tau1",
+                1,
+                "rig.csv, line 1: there is no column \"qd1\"; did you mean \"dq1\"? Rename it, or name it under \
+                 [columns] in the model file: qd = [\"dq1\"], or qd = [] to take velocities from the angles",
+            ),
+            ("Time,q1,qd1,tau1", 1, "in the model file: time = \"Time\""),
+            ("time,angle,qd1", 1, "the header has time, angle, qd1."),
+            (
+                "time,q1,q2,qd1,qd2,tau1,tau2",
+                1,
+                "has 2 joint(s) (q1 to q2) but the model has 1",
+            ),
+            (
+                "time,q1,qd1,tau1",
+                2,
+                "has 1 joint(s) (q1 to q1) but the model has 2",
+            ),
+            ("time,q1,Q2,qd1,qd2,tau1,tau2", 2, "did you mean \"Q2\"?"),
+            ("time,q,qd,tau", 2, "there is no column \"q1\""),
+            ("time,q_hip,q_knee", 1, "joint_names = [\"hip\", ..]"),
+            // A torque or a velocity under another name is not passed over.
+            ("time,q1,qd1,torque_1", 1, "there is no column \"tau1\""),
+            ("time,q1,q2,qd1,qd2,tau1", 2, "there is no column \"tau2\""),
+            ("time,q1,velocity_1,tau1", 1, "there is no column \"qd1\""),
+            (
+                "time,q1,q1,qd1,tau1",
+                1,
+                "column \"q1\" occurs more than once",
+            ),
+            ("0,1,2,3", 1, "has numbers where the header should be"),
+        ];
+        for (header, joints, words) in cases {
+            let message = message(header, joints);
+            assert!(message.contains(words), "{message}");
+        }
+        let columns = Columns {
+            tau: vec!["a".into(), "b".into()],
+            ..Columns::default()
+        };
+        let error = layout("time,q1,qd1,a,b", 1, &columns)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("names 2 column(s) for `tau`"), "{error}");
     }
 
     #[test]
@@ -454,11 +488,8 @@ mod tests {
             tau: vec!["tau2".into()],
             ..Columns::default()
         };
-        let found = layout("time,q1,q2,qd1,qd2,tau1,tau2", 1, &columns).unwrap();
-        assert_eq!(
-            (found.q, found.qd, found.tau),
-            (vec![cell(2)], Some(vec![cell(4)]), Some(vec![cell(6)]))
-        );
+        let found = places("time,q1,q2,qd1,qd2,tau1,tau2", 1, &columns);
+        assert_eq!(found, [2, 4, 6].map(|place| Some(vec![place])));
     }
 
     #[test]
@@ -468,62 +499,29 @@ mod tests {
             ..Columns::default()
         };
         let header = "time,q_elbow,q_base,qd1,qd2,tau_base,tau_elbow";
-        let found = layout(header, 2, &columns).unwrap();
-        assert_eq!(found.q, [cell(2), cell(1)]);
-        assert_eq!(found.qd, Some(vec![cell(3), cell(4)]));
-        assert_eq!(found.tau, Some(vec![cell(5), cell(6)]));
-    }
-
-    #[test]
-    fn a_single_joint_needs_no_number() {
-        for header in ["time,q,qd,tau", "time,q_hip,qd_hip,tau_hip"] {
-            let found = layout(header, 1, &Columns::default()).unwrap();
-            assert_eq!((found.q, found.qd), (vec![cell(1)], Some(vec![cell(2)])));
-            assert_eq!(found.tau, Some(vec![cell(3)]));
-        }
-        assert!(message("time,q,qd,tau", 2).contains("there is no column \"q1\""));
-        assert!(message("time,q_hip,q_knee", 1).contains("joint_names = [\"hip\", ..]"));
-    }
-
-    #[test]
-    fn only_a_header_without_any_torque_is_passive() {
+        let found = places(header, 2, &columns);
         assert_eq!(
-            layout("time,q1,qd1", 1, &Columns::default()).unwrap().tau,
-            None
+            found,
+            [[2, 1], [3, 4], [5, 6]].map(|two| Some(two.to_vec()))
         );
-        assert!(message("time,q1,qd1,torque_1", 1).contains("there is no column \"tau1\""));
-        assert!(message("time,q1,q2,qd1,qd2,tau1", 2).contains("there is no column \"tau2\""));
+        for header in ["time,q,qd,tau", "time,q_hip,qd_hip,tau_hip"] {
+            let found = places(header, 1, &Columns::default());
+            assert_eq!(found, [1, 2, 3].map(|place| Some(vec![place])));
+        }
     }
 
     #[test]
-    fn only_a_header_without_any_velocity_takes_them_from_the_angles() {
-        let none = layout("time,q1,tau1", 1, &Columns::default()).unwrap();
-        assert_eq!((none.qd, none.tau), (None, Some(vec![cell(2)])));
-        assert!(message("time,q1,velocity_1,tau1", 1).contains("there is no column \"qd1\""));
+    fn only_a_header_without_any_torque_or_velocity_does_without() {
+        let [first, second] = [1, 2].map(|place| Some(vec![place]));
+        let places = |header| places(header, 1, &Columns::default());
+        let passive = [first.clone(), second.clone(), None];
+        assert_eq!(places("time,q1,qd1"), passive);
+        assert_eq!(places("time,q1,tau1"), [first, None, second]);
         let from_angles = Columns {
             qd: None,
             ..Columns::default()
         };
         let found = layout("time,q1,qd1,tau1", 1, &from_angles).unwrap();
         assert_eq!((found.qd, found.ignored), (None, vec!["qd1".to_owned()]));
-    }
-
-    #[test]
-    fn mappings_of_the_wrong_length_and_twins_are_errors() {
-        let columns = Columns {
-            tau: vec!["a".into(), "b".into()],
-            ..Columns::default()
-        };
-        let error = layout("time,q1,qd1,a,b", 1, &columns).unwrap_err();
-        assert!(
-            error.to_string().contains("names 2 column(s) for `tau`"),
-            "{error}"
-        );
-        assert!(message("time,q1,q1,qd1,tau1", 1).contains("column \"q1\" occurs more than once"));
-    }
-
-    #[test]
-    fn numbers_are_no_header() {
-        assert!(message("0,1,2,3", 1).contains("has numbers where the header should be"));
     }
 }

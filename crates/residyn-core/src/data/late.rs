@@ -14,20 +14,18 @@ pub(super) fn undone(time: &[f64], channel: Vec<f64>, late_s: f64) -> Vec<f64> {
 }
 
 /// The rows of a log for which all channels have values, given these delays.
-pub(super) fn cut(mut log: Log, late_s: impl IntoIterator<Item = f64>) -> Log {
+pub(super) fn cut(log: Log, late_s: impl IntoIterator<Item = f64>) -> Log {
     let ends = |(early, late): (f64, f64), late_s: f64| (early.min(late_s), late.max(late_s));
     let (early, late) = late_s.into_iter().fold((0.0, 0.0), ends);
     let (Some(first), Some(last)) = (log.time.first(), log.time.last()) else {
         return log;
     };
-    let (from, to) = (first - early, last - late);
-    let begin = row_from(&log.time, from);
-    let end = row_after(&log.time, to).max(begin);
-    for channel in log.columns_mut() {
-        channel.truncate(end);
-        channel.drain(..begin);
+    if early == 0.0 && late == 0.0 {
+        return log;
     }
-    log
+    let begin = row_from(&log.time, first - early);
+    let end = row_after(&log.time, last - late).max(begin);
+    log.at(std::slice::from_ref(&(begin..end)))
 }
 
 #[cfg(test)]

@@ -181,11 +181,14 @@ impl Log {
             .chain(&self.tau)
     }
 
-    pub(super) fn columns_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
-        std::iter::once(&mut self.time)
-            .chain(&mut self.q)
-            .chain(&mut self.qd)
-            .chain(&mut self.tau)
+    /// The columns of a quantity, one for each joint except for the time.
+    pub(super) fn of_mut(&mut self, quantity: Quantity) -> &mut [Vec<f64>] {
+        match quantity {
+            Quantity::Time => std::slice::from_mut(&mut self.time),
+            Quantity::Angle => &mut self.q,
+            Quantity::Velocity => &mut self.qd,
+            Quantity::Torque | Quantity::Command => &mut self.tau,
+        }
     }
 
     /// Checks that a reader would accept every number of the log as a file at `path`.

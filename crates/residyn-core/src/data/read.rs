@@ -55,13 +55,11 @@ impl Log {
             qd: qd.unwrap_or_else(|| q.iter().map(|q| slopes(&time, q)).collect()),
             tau: tau.unwrap_or_else(|| vec![vec![0.0; time.len()]; joints]),
             driven_by: columns.driven_by,
-            masked: vec![vec![]; joints],
-            filled: vec![],
             notes: readings.notes,
             q,
             time,
-            leave_out: vec![],
             path: path.to_owned(),
+            ..Log::empty(joints)
         };
         let log = late::cut(log, layout.late_s());
         match log.rows() {
@@ -100,9 +98,7 @@ impl Log {
             table.add(name, column);
         }
         match rig {
-            Some((joints, columns)) => {
-                Log::of_table(path, &mut table, joints, &columns.completed(joints, path)?)
-            }
+            Some((joints, columns)) => Log::of_table(path, &mut table, joints, columns),
             None => {
                 let has = |name: &str| table.names().iter().any(|known| known == name);
                 let driven_by = match has("cmd1") && !has("tau1") {
@@ -281,11 +277,8 @@ fn longest_pause(time: &[f64]) -> Option<Pause> {
 fn notes(layout: &Layout) -> Vec<String> {
     let mut notes = vec![];
     if !layout.ignored.is_empty() {
-        let names: Vec<String> = layout
-            .ignored
-            .iter()
-            .map(|name| format!("{name:?}"))
-            .collect();
+        let quoted = layout.ignored.iter().map(|name| format!("{name:?}"));
+        let names: Vec<String> = quoted.collect();
         let names = listed(names.iter().map(String::as_str));
         notes.push(format!("columns ignored: {names}"));
     }

@@ -1,6 +1,7 @@
 use std::f64::consts::TAU;
 
 use crate::data::Log;
+use crate::data::statistics::ends;
 use crate::identify::Window;
 use crate::model::Dynamics;
 use crate::sim::{Commands, FIT_S, RK4, Simulator};
@@ -156,8 +157,7 @@ fn simulate(log: &mut Log, first: usize, start: &[f64], model: &Dynamics) -> Opt
 
 /// Whether a joint makes more than a full turn.
 pub(super) fn is_turn(q: &[f64]) -> bool {
-    let low = q.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = q.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let [low, high] = ends(q);
     high - low > TAU
 }
 

@@ -94,9 +94,9 @@ pub(super) fn audit_joints(log: &Log) -> (Vec<JointAudit>, Vec<Motion>) {
         all.map(|joint| Motion::of(log, joint, half_width_s))
             .collect()
     };
-    let motions = smoothed(half_width_s(step_s));
-    let each = Joint::all(log.joints()).zip(&motions).zip(jumps);
-    let mut joints: Vec<JointAudit> = each
+    let mut joints: Vec<JointAudit> = Joint::all(log.joints())
+        .zip(&smoothed(half_width_s(step_s)))
+        .zip(jumps)
         .map(|((joint, motion), jumps)| JointAudit::of(log, step_s, joint, motion, jumps))
         .collect();
     let slow_s = half_width_s(step_s).max(SLOW_S);
@@ -147,7 +147,11 @@ impl JointAudit {
             .filter(|(_, speed)| **speed <= rest_rad_s)
             .map(|(row, _)| *row)
             .collect();
-        let repeats = Repeats::of(motion, rest_rad_s, &q_channel, step_s);
+        let visible_rad_s = (2.0 * q_channel.resolution / step_s).max(rest_rad_s);
+        let moving = (0..motion.rows()).filter(|&k| motion.velocity[k].abs() > visible_rad_s);
+        let moving: Vec<usize> = moving.collect();
+        let repeats = moving.iter().filter(|&&k| motion.moved[k] == 0.0);
+        let repeats: Vec<usize> = repeats.map(|&k| motion.rows[k]).collect();
         Self {
             joint,
             opposed: opposed_velocity(motion, check, step_s),
@@ -159,10 +163,10 @@ impl JointAudit {
             share_at_rest: resting.len() as f64 / speeds.len().max(1) as f64,
             fast_rad_s,
             covers_full_turn: q_channel.range() >= std::f64::consts::TAU,
-            repeated_fraction: repeats.rows.len() as f64 / repeats.moving.max(1) as f64,
+            repeated_fraction: repeats.len() as f64 / moving.len().max(1) as f64,
             disagreeing: log.intervals(disagreeing.iter().copied()),
             at_rest: log.intervals(resting),
-            repeated: log.intervals(repeats.rows),
+            repeated: log.intervals(repeats),
             q: q_channel,
             qd: Channel {
                 spikes: disagreeing.len(),
@@ -190,26 +194,6 @@ fn reversals(velocity: &[f64], rest: f64) -> usize {
     let moving = velocity.iter().copied().filter(|v| v.abs() > rest);
     let turns = |pair: &&[f64]| pair[0] * pair[1] < 0.0;
     moving.collect::<Vec<_>>().windows(2).filter(turns).count()
-}
-
-/// Rows in motion that repeat the angle of the row before.
-struct Repeats {
-    rows: Vec<usize>,
-    /// How many rows are in motion.
-    moving: usize,
-}
-
-impl Repeats {
-    fn of(motion: &Motion, rest: f64, q: &Channel, step_s: f64) -> Self {
-        let visible = (2.0 * q.resolution / step_s).max(rest);
-        let moving = (0..motion.rows()).filter(|&k| motion.velocity[k].abs() > visible);
-        let moving: Vec<usize> = moving.collect();
-        let repeats = moving.iter().filter(|&&k| motion.moved[k] == 0.0);
-        Self {
-            rows: repeats.map(|&k| motion.rows[k]).collect(),
-            moving: moving.len(),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -146,6 +146,25 @@ mod tests {
         rows.for_each(|(row, x)| *x = value(row, *x));
     }
 
+    /// Two joints on sines of these amplitudes and this frequency, at 100 Hz.
+    pub(super) fn two_sines(name: &str, rows: usize, amplitudes: [f64; 2], frequency: f64) -> Log {
+        let time = uniform(rows, 0.01);
+        let over = |size: f64, f: fn(f64) -> f64| {
+            let values = time.iter().map(|t| size * f(frequency * t));
+            values.collect::<Vec<f64>>()
+        };
+        Log {
+            path: name.into(),
+            q: amplitudes.map(|size| over(size, f64::sin)).into(),
+            qd: amplitudes
+                .map(|size| over(size * frequency, f64::cos))
+                .into(),
+            tau: amplitudes.map(|size| over(size, f64::cos)).into(),
+            time,
+            ..Log::empty(2)
+        }
+    }
+
     /// The swing with a change.
     pub(super) fn edited(change: impl FnOnce(&mut Log)) -> Log {
         let mut log = swing();

@@ -12,7 +12,7 @@ use crate::data::signal::resample;
 ///
 /// These are the examined rows around which a cubic can be fitted: neither the ends of the log nor its gaps. They
 /// depend on the times alone, so they are the same rows for all joints of a log.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Motion {
     /// The rows.
     pub rows: Vec<usize>,
@@ -39,18 +39,7 @@ pub(super) struct Motion {
 impl Motion {
     /// Follows a joint through the log, smoothed over `half_width_s` on either side.
     pub fn of(log: &Log, joint: Joint, half_width_s: f64) -> Self {
-        let mut motion = Self {
-            rows: vec![],
-            intervals: vec![],
-            time: vec![],
-            q: vec![],
-            velocity: vec![],
-            acceleration: vec![],
-            tau: vec![],
-            tau_logged: vec![],
-            qd: vec![],
-            moved: vec![],
-        };
+        let mut motion = Self::default();
         for interval in examined(log.rows()) {
             let first = motion.rows();
             motion.follow(log, joint, half_width_s, interval);

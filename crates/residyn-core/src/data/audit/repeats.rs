@@ -119,22 +119,17 @@ fn difference(a: &Log, moves: f64, b: &Log) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::report_repeats;
+    use super::super::tests::{each, two_sines};
+    use super::{Repeated, report_repeats};
     use crate::data::{Audit, Columns, Log, audit};
 
     /// Two joints on sines of this frequency, from this time on.
     fn log(name: &str, start: f64, frequency: f64, off: f64) -> Log {
-        let mut log = Log::empty(2);
-        log.path = name.into();
-        for row in 0..800 {
-            let t = 0.01 * f64::from(row);
-            log.time.push(start + t);
-            for (j, amplitude) in [1.0, 0.3].into_iter().enumerate() {
-                log.q[j].push(amplitude * (frequency * t).sin() + off * (9.0 * t).sin());
-                log.qd[j].push(0.0);
-                log.tau[j].push(amplitude * (frequency * t).cos());
-            }
+        let mut log = two_sines(name, 800, [1.0, 0.3], frequency);
+        for q in &mut log.q {
+            each(q, |row, q| q + off * (0.09 * row as f64).sin());
         }
+        each(&mut log.time, |_, t| start + t);
         log
     }
 
@@ -148,10 +143,8 @@ mod tests {
             log("e.csv", 7.0, 2.3, 0.0),
             log("f.csv", 9.0, 2.0, 0.004),
         ];
-        let mut audits: Vec<_> = logs
-            .iter()
-            .map(|log| audit(log, &Columns::default()))
-            .collect();
+        let audit = |log| audit(log, &Columns::default());
+        let mut audits: Vec<Audit> = logs.iter().map(audit).collect();
         let repeated = report_repeats(&logs, &mut audits);
         let message = |words: &str| -> Vec<bool> {
             let says = |audit: &Audit| audit.findings.iter().any(|f| f.text.contains(words));
@@ -164,9 +157,8 @@ mod tests {
         // If one log moves alike and another is identical, the latter is named.
         let is_same = message("every angle equals that of b.csv");
         assert_eq!(is_same, [false, false, false, false, false, true]);
-        let places = repeated
-            .iter()
-            .map(|repeated| repeated.map(|of| (of.place, of.is_identical())));
+        let place = |of: Repeated| (of.place, of.is_identical());
+        let places = repeated.into_iter().map(|repeated| repeated.map(place));
         let found = [
             None,
             Some((0, false)),

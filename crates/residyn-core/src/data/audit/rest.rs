@@ -37,23 +37,8 @@ fn finding(joint: Joint, range: f64, is_moved_by_others: bool) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::super::audit_together;
+    use super::super::tests::two_sines;
     use crate::data::{Columns, Log, Severity};
-
-    /// Two joints, the second with this amplitude.
-    fn log(name: &str, second: f64) -> Log {
-        let mut log = Log::empty(2);
-        log.path = name.into();
-        for row in 0..600 {
-            let t = 0.01 * f64::from(row);
-            log.time.push(t);
-            for (j, amplitude) in [1.0, second].into_iter().enumerate() {
-                log.q[j].push(amplitude * (2.0 * t).sin());
-                log.qd[j].push(2.0 * amplitude * (2.0 * t).cos());
-                log.tau[j].push(amplitude * (2.0 * t).cos());
-            }
-        }
-        log
-    }
 
     fn message(logs: &[Log]) -> Vec<Vec<Severity>> {
         let audits = audit_together(logs, &Columns::default());
@@ -67,6 +52,7 @@ mod tests {
 
     #[test]
     fn a_joint_that_rests_in_one_log_is_serious_where_no_other_moves_it() {
+        let log = |name, second| two_sines(name, 600, [1.0, second], 2.0);
         let (moves, rests) = (log("moves.csv", 0.5), log("rests.csv", 0.0));
         assert_eq!(message(std::slice::from_ref(&rests)), [[Severity::Serious]]);
         assert_eq!(

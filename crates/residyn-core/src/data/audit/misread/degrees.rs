@@ -64,11 +64,7 @@ impl Judged<'_> {
 
     fn misread(&self) -> Misread {
         let JointAudit { joint, q, qd, .. } = self.audit;
-        let change = |quantity, unit| Change {
-            quantity,
-            joint: Some(*joint),
-            to: To::Unit(unit),
-        };
+        let change = |quantity, unit| Change::of(*joint, quantity, To::Unit(unit));
         let text = format!(
             "{0} covers {1} rad and reaches {2} rad/s, and torque, gravity and friction explain {3} % of its \
              acceleration; with {0} in degrees they explain {4} %: {0} and {5} look like deg and deg/s",

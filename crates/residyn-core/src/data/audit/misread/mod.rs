@@ -91,11 +91,7 @@ pub fn reversed_driving(
     driven_by: Quantity,
     joints: usize,
 ) -> Finding {
-    let opposite = |joint| Change {
-        quantity: driven_by,
-        joint: Some(joint),
-        to: To::Opposite,
-    };
+    let opposite = |joint| Change::of(joint, driven_by, To::Opposite);
     let key = driven_by.key();
     let misread = Misread {
         joint: None,
@@ -146,38 +142,42 @@ fn with_remedies(found: &[Misread], columns: &Columns, joints: usize) -> Vec<Fin
 impl Misread {
     /// What is wrong with one column of a joint.
     fn of_joint(joint: Joint, text: String, quantity: Quantity, to: To) -> Self {
-        let joint = Some(joint);
         Self {
-            joint,
+            joint: Some(joint),
             text,
-            changes: vec![Change {
-                quantity,
-                joint,
-                to,
-            }],
+            changes: vec![Change::of(joint, quantity, to)],
         }
     }
 }
 
 impl Change {
+    fn of(joint: Joint, quantity: Quantity, to: To) -> Self {
+        let joint = Some(joint);
+        Self {
+            quantity,
+            joint,
+            to,
+        }
+    }
+
+    /// Its place among the columns of its quantity.
+    fn place(&self) -> usize {
+        self.joint.map_or(0, Joint::index)
+    }
+
     /// Applies the change to the log.
     fn apply(&self, log: &mut Log) {
-        let values = match (self.quantity, self.joint) {
-            (Quantity::Angle, Some(joint)) => &mut log.q[joint],
-            (Quantity::Velocity, Some(joint)) => &mut log.qd[joint],
-            (Quantity::Torque | Quantity::Command, Some(joint)) => &mut log.tau[joint],
-            _ => &mut log.time,
-        };
+        if matches!(self.to, To::Derived) {
+            log.qd = log.q.iter().map(|q| slopes(&log.time, q)).collect();
+            return;
+        }
+        let values = &mut log.of_mut(self.quantity)[self.place()];
         let factor = match self.to {
             To::Unit(unit) => self.quantity.size_of(unit).unwrap_or(1.0),
             To::Opposite => -1.0,
-            To::Wrapped => {
+            To::Wrapped | To::Derived => {
                 unwrap(values, std::f64::consts::TAU);
                 1.0
-            }
-            To::Derived => {
-                log.qd = log.q.iter().map(|q| slopes(&log.time, q)).collect();
-                return;
             }
         };
         values.iter_mut().for_each(|value| *value *= factor);
@@ -187,18 +187,10 @@ impl Change {
     fn mend(&self, columns: &mut Columns) {
         if matches!(self.to, To::Derived) {
             columns.qd = None;
-            return;
         }
-        let list = match self.quantity {
-            Quantity::Time => None,
-            Quantity::Angle => Some(&mut columns.q),
-            Quantity::Velocity => columns.qd.as_mut(),
-            Quantity::Torque | Quantity::Command => Some(&mut columns.tau),
-        };
-        let column = match (list, self.joint) {
-            (Some(list), Some(joint)) => &mut list[joint],
-            (None, None) => &mut columns.time,
-            _ => return,
+        // Velocities that come from the angles have no columns.
+        let Some(column) = columns.of_mut(self.quantity).get_mut(self.place()) else {
+            return;
         };
         match self.to {
             To::Unit(unit) if column.unit.is_none() => column.unit = Some(unit),

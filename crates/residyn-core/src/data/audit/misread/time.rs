@@ -16,28 +16,21 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
     if step_s <= LONGEST_STEP_S {
         return vec![];
     }
+    let is_plausible = |size: f64| (SHORTEST_STEP_S..=LONGEST_STEP_S).contains(&(step_s * size));
     let units = Quantity::Time.units().iter();
-    let fitting =
-        units.filter(|(_, size)| (SHORTEST_STEP_S..=LONGEST_STEP_S).contains(&(step_s * size)));
-    let mut fitting: Vec<(&'static str, f64)> = fitting.copied().collect();
+    let mut fitting = units.filter(|(_, size)| is_plausible(*size));
     // Speeds in rad/s show which.
-    let message = fitting
-        .iter()
-        .copied()
+    let shown = fitting
+        .clone()
         .find(|(_, size)| speeds_agree(reading, *size));
-    if let Some(unit) = message {
-        fitting = vec![unit];
-    }
-    let Some(&(unit, _)) = fitting.first() else {
+    let Some(&(unit, _)) = shown.or_else(|| fitting.next()) else {
         return vec![];
     };
-    let speeds = match message {
-        Some((_, size)) => format!(
-            ", and logged velocities are {} times the derivative of the angles",
-            short(1.0 / size)
-        ),
-        None => String::new(),
-    };
+    let speeds = shown.map(|(_, size)| {
+        let times = short(1.0 / size);
+        format!(", and logged velocities are {times} times the derivative of the angles")
+    });
+    let speeds = speeds.unwrap_or_default();
     vec![Misread {
         joint: None,
         text: format!(

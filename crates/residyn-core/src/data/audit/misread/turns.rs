@@ -22,11 +22,7 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
         let angles = &log.q[joint];
         let passed = |turn| Some((turn, passings(angles, turn)?));
         let (turn, rows) = [TAU, 360.0].into_iter().find_map(passed)?;
-        let change = |to| Change {
-            quantity: Quantity::Angle,
-            joint: Some(joint),
-            to,
-        };
+        let change = |to| Change::of(joint, Quantity::Angle, to);
         let unit = (turn > TAU).then(|| change(To::Unit("deg")));
         let name = joint.name("q");
         Some(Misread {
