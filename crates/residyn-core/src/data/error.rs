@@ -31,14 +31,13 @@ impl fmt::Display for Place {
 
 /// Why a log could not be read.
 ///
-/// Each message is complete in itself: file, line (from 1, as an editor counts), column name, what is wrong and what to
-/// do. None has a source to print with it.
+/// Each has the file, and the place in it of the header, row or cell. Each message is complete in itself: file, line
+/// (from 1, as an editor counts), column name, what is wrong and what to do. None has a source to print with it.
 #[derive(Debug, Error)]
 pub enum LogError {
     /// The file cannot be opened or read.
     #[error("{path}: cannot be read: {why}; check the path and its permissions")]
     Open {
-        /// The file.
         path: PathBuf,
         /// What the operating system says.
         why: io::Error,
@@ -46,7 +45,6 @@ pub enum LogError {
     /// The bytes are not UTF-8 text.
     #[error("{path}, line {line}: not UTF-8 text; save the log as CSV in UTF-8")]
     NotUtf8 {
-        /// The file.
         path: PathBuf,
         /// Line of the first byte that is not text.
         line: usize,
@@ -54,24 +52,19 @@ pub enum LogError {
     /// The file is not of the form that its beginning suggests.
     #[error("{path}: {fault}")]
     Form {
-        /// The file.
         path: PathBuf,
         /// What is wrong, and what to do.
         fault: String,
     },
     /// There is nothing in the file.
     #[error("{path}: is empty; a log begins with a header such as time,q1,qd1,tau1")]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
+    Empty { path: PathBuf },
     /// The first line holds numbers.
     #[error(
         "{path}, {place}: has numbers where the header should be; put column names \
          such as time,q1,qd1,tau1 above them"
     )]
     NoHeader {
-        /// The file.
         path: PathBuf,
         /// Where the header was expected.
         place: Place,
@@ -79,7 +72,6 @@ pub enum LogError {
     /// There are too few rows below the header.
     #[error("{path}: has {rows} row(s) of numbers below its header; a log needs at least two")]
     TooFewRows {
-        /// The file.
         path: PathBuf,
         /// How many there are: none or one.
         rows: usize,
@@ -87,9 +79,7 @@ pub enum LogError {
     /// A column that the model needs is not in the header.
     #[error("{path}, {place}: there is no column {column:?}; {remedy}")]
     MissingColumn {
-        /// The file.
         path: PathBuf,
-        /// Where the header is.
         place: Place,
         /// The name looked for.
         column: String,
@@ -99,11 +89,8 @@ pub enum LogError {
     /// A column that the model needs is in the header more than once.
     #[error("{path}, {place}: column {column:?} occurs more than once; rename or delete one")]
     DuplicateColumn {
-        /// The file.
         path: PathBuf,
-        /// Where the header is.
         place: Place,
-        /// The name.
         column: String,
     },
     /// The log and the model have different numbers of joints.
@@ -112,9 +99,7 @@ pub enum LogError {
          {model}; use the model of this rig, or choose columns under [columns] in the model file"
     )]
     JointCount {
-        /// The file.
         path: PathBuf,
-        /// Where the header is.
         place: Place,
         /// Joints in the header.
         header: usize,
@@ -142,9 +127,7 @@ pub enum LogError {
          cell for each column (with decimal points, not commas)"
     )]
     Width {
-        /// The file.
         path: PathBuf,
-        /// Where the row is.
         place: Place,
         /// Cells in the row.
         found: usize,
@@ -154,9 +137,7 @@ pub enum LogError {
     /// A cell does not hold a usable number.
     #[error("{path}, {place}, column {column:?}: {fault}")]
     Cell {
-        /// The file.
         path: PathBuf,
-        /// Where the cell is.
         place: Place,
         /// The cell's column, as the header names it.
         column: String,

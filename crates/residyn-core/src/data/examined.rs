@@ -110,15 +110,10 @@ mod tests {
         }
         for rows in [EXAMINED_ROWS + 1, 10_000_000] {
             let intervals = examined(rows);
-            assert_eq!(
-                (intervals[0].start, intervals[STRETCHES - 1].end),
-                (0, rows)
-            );
-            assert!(
-                intervals
-                    .windows(2)
-                    .all(|pair| pair[0].end <= pair[1].start)
-            );
+            let whole = intervals[0].start..intervals[STRETCHES - 1].end;
+            assert_eq!(whole, 0..rows);
+            let mut pairs = intervals.windows(2);
+            assert!(pairs.all(|pair| pair[0].end <= pair[1].start));
             let values: Vec<f64> = (0..rows).map(|row| row as f64).collect();
             assert_eq!(at_examined(&values).len(), EXAMINED_ROWS);
         }
@@ -134,28 +129,18 @@ mod tests {
         log.masked[0] = vec![0, 40_000, 399_999];
         let short = log.at(&examined(400_000)).shortened();
         assert!(short.leave_out.is_empty() && short.notes.is_empty());
-        let of_log = log.shortened();
-        assert_eq!(
-            (of_log.rows(), of_log.leave_out.len()),
-            (EXAMINED_ROWS, STRETCHES - 1)
-        );
-        assert!(of_log.time == of_log.q[0] && of_log.time == of_log.tau[0]);
-        let is_row = |row: &usize| of_log.time[*row] == 0.0 || of_log.time[*row] == 399.999;
-        assert!(of_log.masked[0].len() == 2 && of_log.masked[0].iter().all(is_row));
-        assert!(of_log.notes[0].contains("262144 of its 400000 rows"));
+        let log = log.shortened();
+        assert_eq!(log.rows(), EXAMINED_ROWS);
+        assert_eq!(log.leave_out.len(), STRETCHES - 1);
+        assert!(log.time == log.q[0] && log.time == log.tau[0]);
+        assert_eq!(log.masked[0], [0, EXAMINED_ROWS - 1]);
+        assert_eq!(log.time[EXAMINED_ROWS - 1], 399.999);
+        assert!(log.notes[0].contains("262144 of its 400000 rows"));
         // No window begins or ends at the end of an interval, except at the ends of the log.
-        let ends = of_log
-            .time
-            .windows(2)
-            .filter(|pair| pair[1] - pair[0] > 0.01);
-        let is_left_out = |time: f64| {
-            of_log
-                .leave_out
-                .iter()
-                .any(|span| span.start_s < time && time < span.end_s)
-        };
-        assert!(
-            ends.clone().count() == STRETCHES - 1 && ends.flatten().all(|time| is_left_out(*time))
-        );
+        let pauses = log.time.windows(2).filter(|pair| pair[1] - pair[0] > 0.01);
+        let holds = |span: &Interval, time: f64| span.start_s < time && time < span.end_s;
+        let is_left_out = |time: &f64| log.leave_out.iter().any(|span| holds(span, *time));
+        assert_eq!(pauses.clone().count(), STRETCHES - 1);
+        assert!(pauses.flatten().all(is_left_out));
     }
 }

@@ -31,10 +31,8 @@ pub(super) fn noise_std(values: &[f64]) -> f64 {
         differenced = differences(&differenced);
         inner_deviation(&differenced) / gain.sqrt()
     };
-    GAINS
-        .map(of_order)
-        .into_iter()
-        .fold(f64::INFINITY, f64::min)
+    let each = GAINS.map(of_order);
+    each.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// Values farther from the median than this many deviations are spikes.
@@ -44,10 +42,8 @@ const SPIKES: f64 = 4.0;
 /// itself a whole number of steps if the values are rounded.
 fn inner_deviation(values: &[f64]) -> f64 {
     let (centre, bound) = (median(values), SPIKES * SIGMA_PER_MAD * mad(values));
-    let inner = values.iter().copied();
-    let inner: Vec<f64> = inner
-        .filter(|value| (value - centre).abs() <= bound)
-        .collect();
+    let is_inner = |value: &f64| (value - centre).abs() <= bound;
+    let inner: Vec<f64> = values.iter().copied().filter(is_inner).collect();
     match inner.is_empty() {
         true => 0.0,
         false => deviation(&inner),
@@ -77,9 +73,8 @@ pub(super) fn resolution(values: &[f64]) -> f64 {
 fn distinct_gaps(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let largest = sorted
-        .iter()
-        .fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let sizes = sorted.iter().map(|value| value.abs());
+    let largest = sizes.fold(0.0, f64::max);
     let mut gaps = differences(&sorted);
     gaps.retain(|gap| *gap > 1e-9 * largest);
     gaps
@@ -101,11 +96,8 @@ fn quantum(gaps: &[f64], near: f64) -> Option<f64> {
 /// Whether at least 90 % of the gaps shorter than 20 steps are whole multiples of the step. Over longer gaps, the error
 /// of the step itself would blur the multiples.
 fn are_multiples(gaps: &[f64], step: f64) -> bool {
-    let short: Vec<f64> = gaps
-        .iter()
-        .map(|gap| gap / step)
-        .filter(|n| *n < 20.0)
-        .collect();
+    let steps = gaps.iter().map(|gap| gap / step);
+    let short: Vec<f64> = steps.filter(|n| *n < 20.0).collect();
     let is_whole = |n: &&f64| n.round() > 0.0 && (**n - n.round()).abs() < 0.1;
     short.iter().filter(is_whole).count() as f64 >= 0.9 * short.len() as f64
 }
@@ -159,19 +151,12 @@ mod tests {
 
     #[test]
     fn noise_is_measured_on_top_of_motion_and_despite_spikes() {
-        let mut values: Vec<f64> = (0..4000).map(|i| (i as f64 * 0.01).sin()).collect();
-        // Uniform noise of width 0.1 has a deviation of 0.1 / sqrt(12).
-        let added = noise(values.len());
-        values
-            .iter_mut()
-            .zip(added)
-            .for_each(|(value, noise)| *value += 0.1 * noise);
+        let noisy = |(i, noise): (usize, f64)| (i as f64 * 0.01).sin() + 0.1 * noise;
+        let mut values: Vec<f64> = noise(4000).into_iter().enumerate().map(noisy).collect();
         (0..40).for_each(|i| values[i * 97] += 50.0);
-        assert!(
-            (noise_std(&values) - 0.0289).abs() < 0.001,
-            "{}",
-            noise_std(&values)
-        );
+        // Uniform noise of width 0.1 has a deviation of 0.1 / sqrt(12).
+        let found = noise_std(&values);
+        assert!((found - 0.0289).abs() < 0.001, "{found}");
         assert_eq!(noise_std(&[1.0, 2.0]), 0.0);
     }
 
@@ -192,22 +177,17 @@ mod tests {
     #[test]
     fn a_quantum_is_found_and_none_is_invented() {
         let step = 191.0 / 65535.0;
-        let smooth: Vec<f64> = (0..2000)
-            .map(|i| 2.0 * (i as f64 * 0.0031).sin() + 0.3)
-            .collect();
-        let coarse: Vec<f64> = smooth
-            .iter()
-            .map(|value| (value / step).round() * step)
-            .collect();
+        let smooth = |i: usize| 2.0 * (i as f64 * 0.0031).sin() + 0.3;
+        let smooth: Vec<f64> = (0..2000).map(smooth).collect();
+        let coarse = smooth.iter().map(|value| (value / step).round() * step);
+        let coarse: Vec<f64> = coarse.collect();
         assert!((resolution(&coarse) / step - 1.0).abs() < 1e-6);
-        let skipping: Vec<f64> = (0..300)
-            .map(|i| 0.022 * f64::from(5 * (i / 2) + 2 * (i % 2)))
-            .collect();
+        let skipping = |i: i32| 0.022 * f64::from(5 * (i / 2) + 2 * (i % 2));
+        let skipping: Vec<f64> = (0..300).map(skipping).collect();
         assert!((resolution(&skipping) - 0.022).abs() < 1e-6);
-        assert_eq!(resolution(&smooth), 0.0);
-        assert_eq!(resolution(&noise(5000)), 0.0);
-        assert_eq!(resolution(&[1.0; 50]), 0.0);
-        assert_eq!(resolution(&[1.0, 2.0]), 0.0);
+        for continuous in [smooth, noise(5000), vec![1.0; 50], vec![1.0, 2.0]] {
+            assert_eq!(resolution(&continuous), 0.0);
+        }
     }
 
     #[test]
@@ -218,11 +198,8 @@ mod tests {
             ((i as f64 * 0.004).sin() / step).round() * step + turns - 3.0 * turns.signum()
         };
         let values: Vec<f64> = (0..2000).map(wrapped).collect();
-        assert!(
-            (resolution(&values) - step).abs() < 1e-5,
-            "{}",
-            resolution(&values)
-        );
+        let found = resolution(&values);
+        assert!((found - step).abs() < 1e-5, "{found}");
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::data::jumps::{JUMP_MADS, JUMP_RESOLUTION_STEPS, JUMP_SHARE_OF_RANGE};
 use crate::data::lag::{Lag, lag};
 use crate::data::projection::{dot, orthonormal, unexplained};
 use crate::data::signal::interpolate;
-use crate::data::statistics::{SIGMA_PER_MAD, mad, median};
+use crate::data::statistics::{SIGMA_PER_MAD, mad, median_of};
 
 /// The longest lag looked for \[s\]. Filters and buses of real rigs stay below 40 ms; a longer search
 /// would find chance agreements.
@@ -120,27 +120,20 @@ pub(super) fn opposed_velocity(
 
 /// Rows, and the logged velocity of each with the derivative of the angle `lag_s` earlier.
 fn aligned_velocities(motion: &Motion, lag_s: f64) -> (Vec<usize>, Vec<(f64, f64)>) {
-    let of_interval = |interval: &Range<usize>| {
-        let (time, velocity) = (
-            &motion.time[interval.clone()],
-            &motion.velocity[interval.clone()],
-        );
+    let of_interval = |rows: Range<usize>| {
+        let (time, velocity) = (&motion.time[rows.clone()], &motion.velocity[rows.clone()]);
         let derived = move |k: usize| interpolate(time, velocity, motion.time[k] - lag_s);
-        let pair = move |k: usize| Some((motion.rows[k], (motion.qd[k], derived(k)?)));
-        interval.clone().filter_map(pair)
+        rows.filter_map(move |k| Some((motion.rows[k], (motion.qd[k], derived(k)?))))
     };
-    motion.intervals.iter().flat_map(of_interval).unzip()
+    let intervals = motion.intervals.iter().cloned();
+    intervals.flat_map(of_interval).unzip()
 }
 
 /// Ratio of logged to derived velocity: the median over the rows faster than a third of the fast
 /// speed, which spikes cannot move and slow rows cannot blur.
 fn velocity_scale(pairs: &[(f64, f64)], fast_rad_s: f64) -> f64 {
-    let ratios: Vec<f64> = pairs
-        .iter()
-        .filter(|(_, derived)| derived.abs() > fast_rad_s / 3.0)
-        .map(|(logged, derived)| logged / derived)
-        .collect();
-    median(&ratios)
+    let fast = pairs.iter().filter(|pair| pair.1.abs() > fast_rad_s / 3.0);
+    median_of(fast.map(|(logged, derived)| logged / derived).collect())
 }
 
 /// The step of the uniform series that lags are sought on \[s\]: the log's own, but not below 1 ms, as
@@ -207,7 +200,7 @@ fn unexplained_share(columns: &[Vec<f64>], series: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::joint::{JointAudit, audit_joints};
-    use super::super::tests::{edited, one_joint, swing, uniform};
+    use super::super::tests::{each, edited, one_joint, swing, uniform};
     use crate::data::log::Log;
 
     fn joint(log: &Log) -> JointAudit {
@@ -219,21 +212,17 @@ mod tests {
         let joint = joint(&swing());
         let check = joint.velocity.unwrap();
         assert!((check.scale - 1.0).abs() < 1e-3, "{check:?}");
-        assert!(
-            check.lag_s.abs() < 1e-4 && check.correlation > 0.999,
-            "{check:?}"
-        );
+        let is_exact = check.lag_s.abs() < 1e-4 && check.correlation > 0.999;
+        assert!(is_exact, "{check:?}");
         assert_eq!(joint.qd.spikes, 0);
     }
 
     #[test]
     fn scale_lag_and_spikes_of_a_velocity_are_found_together() {
         let mut log = swing();
-        let exact = log.qd[0].clone();
-        for row in 3..log.rows() {
-            // Degrees, three rows late.
-            log.qd[0][row] = exact[row - 3].to_degrees();
-        }
+        // Degrees, three rows late.
+        log.qd[0].rotate_right(3);
+        each(&mut log.qd[0][3..], |_, v| v.to_degrees());
         (0..20).for_each(|i| log.qd[0][400 + 200 * i] += 300.0);
         let joint = joint(&log);
         let check = joint.velocity.unwrap();
@@ -246,9 +235,8 @@ mod tests {
     #[test]
     fn a_backward_difference_lags_half_a_step() {
         let mut log = swing();
-        for row in 1..log.rows() {
-            log.qd[0][row] = (log.q[0][row] - log.q[0][row - 1]) / 0.002;
-        }
+        let q = &log.q[0];
+        each(&mut log.qd[0][1..], |row, _| (q[row + 1] - q[row]) / 0.002);
         let lag = joint(&log).velocity.unwrap().lag_s;
         assert!((lag - 0.001).abs() < 1e-4, "{lag}");
     }
@@ -281,10 +269,8 @@ mod tests {
     fn the_torque_lag_is_the_delay_alone() {
         for delay in [0, 4] {
             let found = joint(&driven(delay)).torque_lag.unwrap();
-            assert!(
-                (found.lag_s - 0.002 * delay as f64).abs() < 5e-4,
-                "{delay}: {found:?}"
-            );
+            let off_s = found.lag_s - 0.002 * delay as f64;
+            assert!(off_s.abs() < 5e-4, "{delay}: {found:?}");
         }
     }
 

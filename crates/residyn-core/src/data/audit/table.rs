@@ -84,12 +84,9 @@ impl Audit {
             "joint", "fast rad/s", "at rest", "reversals", "full turn", "qd scale", "qd lag ms"
         )?;
         for joint in &self.joints {
-            let scale = joint.velocity.map(|check| short(check.scale));
-            let lag = joint.velocity.map(|check| short(1e3 * check.lag_s));
-            let torque = joint
-                .torque_lag
-                .map(|lag| format!("{} ms", short(1e3 * lag.lag_s)));
-            let or_dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+            let or_dash = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), short);
+            let velocity = joint.velocity;
+            let torque = joint.torque_lag.map(|lag| 1e3 * lag.lag_s);
             writeln!(
                 f,
                 "{:<6}{:>11}{:>9}{:>11}{:>10}{:>10}{:>10}  {}",
@@ -98,9 +95,9 @@ impl Audit {
                 format!("{:.1} %", 100.0 * joint.share_at_rest),
                 joint.reversals,
                 if joint.covers_full_turn { "yes" } else { "no" },
-                or_dash(scale),
-                or_dash(lag),
-                or_dash(torque)
+                or_dash(velocity.map(|check| check.scale)),
+                or_dash(velocity.map(|check| 1e3 * check.lag_s)),
+                or_dash(torque) + torque.map_or("", |_| " ms")
             )?;
         }
         Ok(())
@@ -150,22 +147,16 @@ pub(super) fn short(value: f64) -> String {
     if size != 0.0 && !(1e-4..1e6).contains(&size) {
         return format!("{value:.1e}");
     }
-    let before_point = if size < 1.0 {
-        0
-    } else {
-        size.log10() as usize + 1
-    };
     // Small numbers keep their digits: 0.002914 has two zeros that are not significant.
-    let zeros = if size > 0.0 && size < 0.1 {
-        (-size.log10()) as usize
-    } else {
-        0
+    let decimals = match size {
+        1.0.. => 3_usize.saturating_sub(size.log10() as usize),
+        0.0 => 4,
+        _ => 4 + (-size.log10()) as usize,
     };
-    let text = format!("{value:.*}", 4_usize.saturating_sub(before_point) + zeros);
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
+    let text = format!("{value:.decimals$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
     }
 }
 
