@@ -101,6 +101,6 @@ mod tests {
     #[test]
     fn constant_torques_and_short_logs_have_no_demand() {
         assert_eq!(demand(&edited(|log| log.tau[0].fill(0.7))), None);
-        assert_eq!(demand(&swing().at(&[0..100])), None);
+        assert_eq!(demand(&swing().at(std::slice::from_ref(&(0..100)))), None);
     }
 }

@@ -25,6 +25,8 @@ struct Seen<'a> {
     audit: &'a Audit,
 }
 
+type JointCheck = fn(&JointAudit, &Seen<'_>) -> Option<Finding>;
+
 /// The joints that a check looks at.
 enum Of {
     Command,
@@ -34,7 +36,7 @@ enum Of {
 }
 
 /// The checks of a log as a whole.
-static WHOLE: [fn(&Seen<'_>) -> Option<Finding>; 7] = [
+static LOG_CHECKS: [fn(&Seen<'_>) -> Option<Finding>; 7] = [
     whole::left_out,
     whole::examined,
     whole::gaps,
@@ -45,7 +47,7 @@ static WHOLE: [fn(&Seen<'_>) -> Option<Finding>; 7] = [
 ];
 
 /// The checks of each joint.
-static JOINT: [(Of, fn(&JointAudit, &Seen<'_>) -> Option<Finding>); 16] = [
+static JOINT_CHECKS: [(Of, JointCheck); 16] = [
     (Of::Command, drive::constant_command),
     (Of::ConstantTorque, drive::constant_torque),
     (Of::Torque, drive::one_sided),
@@ -68,9 +70,11 @@ static JOINT: [(Of, fn(&JointAudit, &Seen<'_>) -> Option<Finding>); 16] = [
 pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
     let seen = &Seen { log, audit };
     let notes = log.notes.iter().map(|note| Finding::new(Info, note));
-    let whole = WHOLE.iter().filter_map(|check| check(seen));
+    let whole = LOG_CHECKS.iter().filter_map(|check| check(seen));
     let joints = audit.joints.iter().flat_map(|joint| {
-        let checks = JOINT.iter().filter(move |(of, _)| seen.has(of, joint));
+        let checks = JOINT_CHECKS
+            .iter()
+            .filter(move |(of, _)| seen.has(of, joint));
         checks.filter_map(move |(_, check)| check(joint, seen))
     });
     notes.chain(whole).chain(joints).collect()
