@@ -48,7 +48,7 @@ fn too_deep(text: &str) -> Option<usize> {
 }
 
 /// The line of a place \[bytes\], counted from 1.
-fn line(text: &str, at: usize) -> usize {
+pub(crate) fn line(text: &str, at: usize) -> usize {
     text[..at].matches('\n').count() + 1
 }
 

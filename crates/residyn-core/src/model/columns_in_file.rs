@@ -1,9 +1,12 @@
 //! The table `[columns]` of a model file: which columns of a log hold what, and in which units.
 
-use super::reader::{FileError, NameOrTable, Section};
+use super::reader::{FileError, Section};
+use super::tables::ColumnTable;
+use super::values::OrTable;
 use crate::data::{Column, Columns, Quantity};
 
-const KEYS: &[&str] = &["column", "unit", "factor", "wrapped", "late"];
+/// `"position"`, or `{ column = "position", unit = "deg", factor = -1, wrapped = true, late = 0.004 }`.
+type Entry<'a> = OrTable<String, ColumnTable<'a>>;
 
 pub(super) fn columns(
     section: Option<Section<'_>>,
@@ -26,21 +29,23 @@ pub(super) fn columns(
     ]
     .map(Quantity::key);
     section.only(&["topic", time, q, qd, driven])?;
-    columns.topic = section.text("topic")?.map(|topic| topic.value);
-    if let Some(time) = section.name_or_table("time")? {
-        columns.time = column(time, Quantity::Time)?;
+    columns.topic = section.read("topic")?;
+    if let Some(entry) = section.read(time)? {
+        columns.time = column(entry, Quantity::Time)?;
     }
-    if let Some(q) = list(&section, Quantity::Angle, joints)? {
-        columns.q = q;
+    let given = |quantity: Quantity| section.read::<Option<Vec<Entry<'_>>>>(quantity.key());
+    let list = |entries, quantity| list(&section, entries, quantity, joints);
+    if let Some(entries) = given(Quantity::Angle)? {
+        columns.q = list(entries, Quantity::Angle)?;
     }
-    if let Some(tau) = list(&section, driven_by, joints)? {
-        columns.tau = tau;
+    if let Some(entries) = given(driven_by)? {
+        columns.tau = list(entries, driven_by)?;
     }
-    // An empty list says that no column holds velocities.
-    if section.is_empty_list("qd") {
-        columns.qd = None;
-    } else if let Some(qd) = list(&section, Quantity::Velocity, joints)? {
-        columns.qd = Some(qd);
+    if let Some(entries) = given(Quantity::Velocity)? {
+        // An empty list says that no column holds velocities.
+        let is_given = !entries.is_empty();
+        let velocities = is_given.then(|| list(entries, Quantity::Velocity));
+        columns.qd = velocities.transpose()?;
     }
     Ok(columns)
 }
@@ -48,67 +53,55 @@ pub(super) fn columns(
 /// One column per joint.
 fn list(
     section: &Section<'_>,
+    entries: Vec<Entry<'_>>,
     quantity: Quantity,
     joints: usize,
-) -> Result<Option<Vec<Column>>, FileError> {
-    let key = quantity.key();
-    let Some(given) = section.names_or_tables(key)? else {
-        return Ok(None);
-    };
-    if given.len() != joints {
-        let message = format!(
-            "`{key}` needs one column per joint: {joints}, found {}",
-            given.len()
-        );
+) -> Result<Vec<Column>, FileError> {
+    if entries.len() != joints {
+        let (key, found) = (quantity.key(), entries.len());
+        let message = format!("`{key}` needs one column per joint: {joints}, found {found}");
         return Err(section.error_at(key, message));
     }
-    let columns = given.into_iter().map(|entry| column(entry, quantity));
-    columns.collect::<Result<_, _>>().map(Some)
+    let columns = entries.into_iter().map(|entry| column(entry, quantity));
+    columns.collect()
 }
 
-/// `"position"`, or `{ column = "position", unit = "deg", factor = -1, wrapped = true, late = 0.004 }`.
-fn column(entry: NameOrTable<'_>, quantity: Quantity) -> Result<Column, FileError> {
+fn column(entry: Entry<'_>, quantity: Quantity) -> Result<Column, FileError> {
     let table = match entry {
-        NameOrTable::Name(name) => return Ok(Column::named(name.value)),
-        NameOrTable::Table(table) => table,
+        OrTable::Plain(name) => return Ok(Column::named(name)),
+        OrTable::Table(table) => table,
     };
-    table.only(KEYS)?;
-    let wrapped = table.flag("wrapped")?;
-    if wrapped && quantity != Quantity::Angle {
-        return Err(table.error_at("wrapped", "`wrapped` is for columns of `q`"));
+    let wrong = |key: &str, message: &str| Err(table.section.error_at(key, message));
+    if table.wrapped && quantity != Quantity::Angle {
+        return wrong("wrapped", "`wrapped` is for columns of `q`");
     }
-    let factor = table.number("factor")?.unwrap_or(1.0);
-    if factor == 0.0 || !factor.is_finite() || (factor < 0.0 && quantity == Quantity::Time) {
-        return Err(table.error_at("factor", format!("`factor` cannot be {factor} here")));
+    let factor = table.factor.unwrap_or(1.0);
+    if factor == 0.0 || (factor < 0.0 && quantity == Quantity::Time) {
+        return wrong("factor", &format!("`factor` cannot be {factor} here"));
     }
-    let late_s = table.number("late")?.unwrap_or(0.0);
-    if !late_s.is_finite() || (late_s != 0.0 && quantity == Quantity::Time) {
+    let late_s = table.late.unwrap_or(0.0);
+    if late_s != 0.0 && quantity == Quantity::Time {
         let message = "`late` must be a time in s, for columns other than `time`";
-        return Err(table.error_at("late", message));
+        return wrong("late", message);
     }
     Ok(Column {
-        name: table.required_text("column")?.value,
         unit: unit(&table, quantity)?,
+        name: table.column,
         factor,
-        wrapped,
+        wrapped: table.wrapped,
         late_s,
     })
 }
 
-fn unit(table: &Section<'_>, quantity: Quantity) -> Result<Option<&'static str>, FileError> {
-    let Some(given) = table.text("unit")? else {
+fn unit(table: &ColumnTable<'_>, quantity: Quantity) -> Result<Option<&'static str>, FileError> {
+    let Some(given) = &table.unit else {
         return Ok(None);
     };
-    let names: Vec<&'static str> = quantity.units().iter().map(|(name, _)| *name).collect();
-    match names.iter().find(|name| **name == given.value) {
-        Some(name) => Ok(Some(name)),
-        None => {
-            let known = names.join(", ");
-            let message = format!(
-                "unknown unit {:?}; known are {known}; give another as `factor`",
-                given.value
-            );
-            Err(table.error_at("unit", message))
-        }
+    let names = quantity.units().iter().map(|(name, _)| *name);
+    if let Some(name) = names.clone().find(|name| name == given) {
+        return Ok(Some(name));
     }
+    let known = names.collect::<Vec<_>>().join(", ");
+    let message = format!("unknown unit {given:?}; known are {known}; give another as `factor`");
+    Err(table.section.error_at("unit", message))
 }

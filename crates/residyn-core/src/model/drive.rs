@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::assemble::lower;
-use super::reader::{Document, FileError, Located, Section};
+use super::reader::{FileError, Located, Section};
 use super::system::{Equations, Model};
 use crate::data::{Joint, Log, Quantity};
 use crate::expr::{Formula, Graph, Node, Program, Scope};
@@ -17,29 +17,19 @@ pub(super) struct Drive(Vec<Located<Formula>>);
 
 impl Drive {
     /// The table `[drive]`: one formula per joint, `tau1` to `taun`.
-    pub fn read(
-        document: &Document,
-        section: &Section<'_>,
-        joints: usize,
-    ) -> Result<Self, FileError> {
+    pub fn read(section: &Section<'_>, joints: usize) -> Result<Self, FileError> {
         let names: Vec<String> = Joint::all(joints).map(|joint| joint.name("tau")).collect();
         section.only(&names.iter().map(String::as_str).collect::<Vec<_>>())?;
         let formula = |name: &String| {
-            let text = section.text(name)?;
-            let text = text.ok_or_else(|| {
-                let message = format!(
-                    "`{name}` is missing in [drive]; a joint whose command is its torque has {name} = \"{}\"",
-                    name.replace("tau", "cmd")
-                );
-                section.error(message)
-            })?;
-            document.formula(&text)
+            section.read::<Option<_>>(name)?.ok_or_else(|| {
+                let command = name.replace("tau", Quantity::Command.key());
+                section.error(format!(
+                    "`{name}` is missing in [drive]; a joint whose command is its torque has {name} = \"{command}\""
+                ))
+            })
         };
-        names
-            .iter()
-            .map(formula)
-            .collect::<Result<_, _>>()
-            .map(Self)
+        let formulas = names.iter().map(formula);
+        formulas.collect::<Result<_, _>>().map(Self)
     }
 
     pub fn formulas(&self) -> &[Located<Formula>] {

@@ -6,54 +6,14 @@ use std::str::FromStr;
 use super::effect::{
     COUPLING_NAMES, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure, PLACE, RATIO,
 };
-use super::filter::CommandFilter;
 use super::reader::{Document, FileError, Located, Section};
-use crate::expr::{Formula, Graph, Scope};
+use super::sections;
+use super::tables::{EffectFile, EffectParameterTable, EffectTable};
+use super::values::{ActsOn, Named};
+use crate::expr::Formula;
 
-const EFFECT_KEYS: &[&str] = &[
-    "name",
-    "about",
-    "force",
-    "torque",
-    "angle",
-    "inertia",
-    "command",
-    "reading",
-    "coupling",
-    "payload",
-    "contains",
-    "confused_with",
-    "shown_by",
-    "joints",
-    "valid_if",
-    "baseline",
-];
-const PARAMETER_KEYS: &[&str] = &[
-    "unit",
-    "about",
-    "typical",
-    "positive",
-    "bounds",
-    "start",
-    "search",
-    "relative_to",
-    "whole",
-    "per",
-];
 const ONE_WAY: &str =
     "one of force, torque, angle, inertia, command, reading, coupling and payload";
-const ALL_OR_FIRST: [(&str, bool); 3] = [("", false), ("all", false), ("first", true)];
-const FILTERS: [(&str, Option<CommandFilter>); 3] = [
-    ("", None),
-    ("delay", Some(CommandFilter::Delay)),
-    ("lag", Some(CommandFilter::Lag)),
-];
-const MEASURES: [(&str, Measure); 3] = [
-    ("", Measure::One),
-    ("speed", Measure::Speed),
-    ("torque", Measure::Torque),
-];
-const PER_LOG: &str = r#""log" for a parameter with a value of its own in each log"#;
 
 impl Effect {
     /// The effect in `text`; `path` is for messages.
@@ -65,36 +25,33 @@ impl Effect {
     }
 
     fn from_document(document: &Document) -> Result<Self, FileError> {
-        let top = document.parse()?;
-        top.only(&["effect", "parameters"])?;
-        let section = top.required_section("effect")?;
-        section.only(EFFECT_KEYS)?;
-        let parameters = top
-            .required_section("parameters")?
-            .named_sections()?
-            .into_iter()
-            .map(|(name, section)| parameter(name, &section))
-            .collect::<Result<Vec<_>, _>>()?;
-        let entry = entry(document, &section, &parameters)?;
-        let list = |key| -> Result<Vec<String>, FileError> {
-            let texts = section.texts(key)?.unwrap_or_default();
-            Ok(texts.into_iter().map(|text| text.value).collect())
-        };
-        let valid_if = section.formula("valid_if")?;
-        if let Some(formula) = &valid_if {
-            check_names(document, formula, &[], &parameters)?;
+        let EffectFile {
+            effect: mut table,
+            parameters: Named(parameters),
+            section,
+        } = EffectFile::of(document.parse()?)?;
+        section.read::<Section<'_>>("parameters")?;
+        let parameters = parameters.into_iter().map(parameter);
+        let parameters = parameters.collect::<Result<Vec<_>, _>>()?;
+        let entry = entry(&mut table, &parameters)?;
+        if let Some(condition) = &table.valid_if {
+            document.check_names(condition, names(&parameters))?;
+        }
+        if table.baseline == Some(0) {
+            let message = "`baseline` must be a rank of at least 1; leave it out for an effect that few machines have";
+            return Err(table.section.error_at("baseline", message));
         }
         Ok(Self {
-            name: section.required_text("name")?.value,
-            valid_if: valid_if.map(|formula| formula.value),
-            about: section.required_text("about")?.value,
+            name: table.name,
+            valid_if: table.valid_if.map(|condition| condition.value),
+            about: table.about,
             entry,
             parameters,
-            contains: list("contains")?,
-            confused_with: list("confused_with")?,
-            shown_by: section.text_or_empty("shown_by")?,
-            baseline: baseline(&section)?,
-            first_joint_only: section.choice("joints", r#""all" or "first""#, &ALL_OR_FIRST)?,
+            contains: table.contains,
+            confused_with: table.confused_with,
+            shown_by: table.shown_by.unwrap_or_default(),
+            baseline: table.baseline,
+            first_joint_only: table.joints == Some(ActsOn::First),
         })
     }
 }
@@ -108,126 +65,120 @@ impl FromStr for Effect {
     }
 }
 
-/// The rank of a baseline effect.
-fn baseline(section: &Section<'_>) -> Result<Option<usize>, FileError> {
-    match section.whole("baseline")? {
-        Some(0) => Err(section.error_at(
-            "baseline",
-            "`baseline` must be a rank of at least 1; leave it out for an effect that few machines have",
-        )),
-        rank => Ok(rank),
-    }
-}
-
-fn entry(
-    document: &Document,
-    section: &Section<'_>,
-    parameters: &[EffectParameter],
-) -> Result<Entry, FileError> {
+/// The one way in which the effect enters the equations; its formula is taken from the table.
+fn entry(table: &mut EffectTable<'_>, parameters: &[EffectParameter]) -> Result<Entry, FileError> {
     type Make = fn(Formula) -> Entry;
-    let kinds: [(&str, Make, &[&str]); 7] = [
-        ("force", Entry::Force, &EFFECT_NAMES),
-        ("torque", Entry::Torque, &EFFECT_NAMES),
-        ("angle", Entry::Angle, &EFFECT_NAMES),
-        ("inertia", Entry::Inertia, &EFFECT_NAMES),
-        ("reading", Entry::Reading, &EFFECT_NAMES),
-        ("coupling", Entry::Coupling, &COUPLING_NAMES),
-        ("payload", Entry::Payload, &[]),
+    /// Key, formula, entry, names that the formula may mention, parameters that must be there.
+    type Way<'n> = (
+        &'n str,
+        Option<Located<Formula>>,
+        Make,
+        &'n [&'n str],
+        &'n [&'n str],
+    );
+    let ways: [Way<'_>; 7] = [
+        (
+            "force",
+            table.force.take(),
+            Entry::Force,
+            &EFFECT_NAMES,
+            &[],
+        ),
+        (
+            "torque",
+            table.torque.take(),
+            Entry::Torque,
+            &EFFECT_NAMES,
+            &[],
+        ),
+        (
+            "angle",
+            table.angle.take(),
+            Entry::Angle,
+            &EFFECT_NAMES,
+            &[],
+        ),
+        (
+            "inertia",
+            table.inertia.take(),
+            Entry::Inertia,
+            &EFFECT_NAMES,
+            &[],
+        ),
+        (
+            "reading",
+            table.reading.take(),
+            Entry::Reading,
+            &EFFECT_NAMES,
+            &[],
+        ),
+        (
+            "coupling",
+            table.coupling.take(),
+            Entry::Coupling,
+            &COUPLING_NAMES,
+            &[RATIO],
+        ),
+        ("payload", table.payload.take(), Entry::Payload, &[], &PLACE),
     ];
-    let mut found = command(section, parameters)?;
-    for (key, make, names) in kinds {
-        if let Some(formula) = section.formula(key)? {
-            if found.is_some() {
-                return Err(section.error_at(key, format!("an effect has {ONE_WAY}")));
-            }
-            check_names(document, &formula, names, parameters)?;
-            let needed: &[&str] = match key {
-                "coupling" => &[RATIO],
-                "payload" => &PLACE,
-                _ => &[],
-            };
-            check_has(section, key, needed, parameters)?;
-            found = Some(make(formula.value));
+    let section = &table.section;
+    let mut found = command(table, parameters)?;
+    for (key, formula, make, known, needed) in ways {
+        let Some(formula) = formula else { continue };
+        if found.is_some() {
+            return Err(section.error_at(key, format!("an effect has {ONE_WAY}")));
         }
+        let known = known.iter().copied().chain(names(parameters));
+        section.document.check_names(&formula, known)?;
+        let is_missing = |name: &&&str| !names(parameters).any(|own| own == **name);
+        if let Some(name) = needed.iter().find(is_missing) {
+            return Err(section.error_at(key, format!("`{key}` needs a parameter `{name}`")));
+        }
+        found = Some(make(formula.value));
     }
     found.ok_or_else(|| section.error(format!("{ONE_WAY} is missing in [effect]")))
 }
 
-/// Parameters that a kind of effect needs by name: the share of the next joint, the position of a load.
-fn check_has(
-    section: &Section<'_>,
-    key: &str,
-    needed: &[&str],
-    parameters: &[EffectParameter],
-) -> Result<(), FileError> {
-    let has = |name: &&&str| parameters.iter().any(|p| p.name == **name);
-    match needed.iter().find(|name| !has(name)) {
-        None => Ok(()),
-        Some(name) => Err(section.error_at(key, format!("`{key}` needs a parameter `{name}`"))),
-    }
+fn names(parameters: &[EffectParameter]) -> impl Iterator<Item = &str> {
+    parameters.iter().map(|parameter| parameter.name.as_str())
 }
 
 /// `command = "delay"` or `"lag"`, with the time as the only parameter.
 fn command(
-    section: &Section<'_>,
+    table: &EffectTable<'_>,
     parameters: &[EffectParameter],
 ) -> Result<Option<Entry>, FileError> {
-    let Some(filter) = section.choice("command", r#""delay" or "lag""#, &FILTERS)? else {
-        return Ok(None);
-    };
-    match parameters {
-        [time] if time.unit == "s" && time.bounds[0] >= 0.0 && !time.whole => {
-            Ok(Some(Entry::Command(filter)))
-        }
-        _ => Err(section.error_at(
-            "command",
-            "a filter of the command has one parameter, with `unit = \"s\"` and `positive = true`",
-        )),
+    let is_time = |parameters: &[EffectParameter]| matches!(parameters, [time] if time.unit == "s" && time.bounds[0] >= 0.0 && !time.whole);
+    if table.command.is_some() && !is_time(parameters) {
+        let message =
+            "a filter of the command has one parameter, with `unit = \"s\"` and `positive = true`";
+        return Err(table.section.error_at("command", message));
     }
+    Ok(table.command.map(Entry::Command))
 }
 
-/// A formula may mention the parameters and these `names`.
-fn check_names(
-    document: &Document,
-    formula: &Located<Formula>,
-    names: &[&str],
-    parameters: &[EffectParameter],
-) -> Result<(), FileError> {
-    let parameters = parameters.iter().map(|p| p.name.as_str());
-    let mut graph = Graph::new();
-    let scope = Scope::of_inputs(&mut graph, names.iter().copied().chain(parameters));
-    let lowered = scope.lower(&mut graph, &formula.value);
-    lowered
-        .map(|_| ())
-        .map_err(|error| document.formula_error(formula.at, &error))
-}
-
-fn parameter(name: String, section: &Section<'_>) -> Result<EffectParameter, FileError> {
-    section.only(PARAMETER_KEYS)?;
-    let typical = section.required_number("typical")?;
-    if typical <= 0.0 {
-        return Err(section.error_at(
-            "typical",
-            "`typical` must be a magnitude: a number above zero",
-        ));
+fn parameter(
+    (name, table): (String, EffectParameterTable<'_>),
+) -> Result<EffectParameter, FileError> {
+    if table.typical <= 0.0 {
+        let message = "`typical` must be a magnitude: a number above zero";
+        return Err(table.section.error_at("typical", message));
     }
-    let starts = match section.numbers("search")? {
-        Some(values) if values.is_empty() => {
-            return Err(section.error_at("search", "`search` is empty"));
-        }
-        Some(values) => values,
-        None => vec![section.number("start")?.unwrap_or(0.0)],
-    };
+    if table.search.as_ref().is_some_and(Vec::is_empty) {
+        return Err(table.section.error_at("search", "`search` is empty"));
+    }
     Ok(EffectParameter {
         name,
-        unit: section.required_text("unit")?.value,
-        about: section.text_or_empty("about")?,
-        typical,
-        bounds: section.bounds()?,
-        starts,
-        measure: section.choice("relative_to", r#""speed" or "torque""#, &MEASURES)?,
-        whole: section.flag("whole")?,
-        per_log: section.choice("per", PER_LOG, &[("", false), ("log", true)])?,
+        bounds: sections::bounds(&table.section, table.positive, table.bounds)?,
+        unit: table.unit,
+        about: table.about.unwrap_or_default(),
+        typical: table.typical,
+        starts: table
+            .search
+            .unwrap_or_else(|| vec![table.start.unwrap_or(0.0)]),
+        measure: table.relative_to.unwrap_or(Measure::One),
+        whole: table.whole,
+        per_log: table.per.is_some(),
     })
 }
 

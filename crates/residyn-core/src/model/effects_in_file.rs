@@ -1,18 +1,22 @@
 //! The `[[effect]]` entries of a model file.
 
 use super::dynamics::PerLogValue;
-use super::effect::{Effect, EffectParameter};
-use super::fitted::{FittedEffect, Status};
+use super::effect::Effect;
+use super::fitted::FittedEffect;
 use super::reader::{FileError, Section};
-use super::sections::interval;
+use super::sections;
+use super::tables::{PerLogTable, ValueTable};
+use super::values::{Limits, Named, OrTable};
 use crate::data::Joint;
 
+/// A value and its 95 % interval.
+type Estimate = (f64, Option<[f64; 2]>);
+
 pub(super) fn read(
-    top: &Section<'_>,
+    sections: &[Section<'_>],
     joints: usize,
     library: &[Effect],
 ) -> Result<Vec<FittedEffect>, FileError> {
-    let sections = top.sections("effect")?;
     sections
         .iter()
         .map(|section| fitted(section, joints, library))
@@ -24,50 +28,43 @@ fn fitted(
     joints: usize,
     library: &[Effect],
 ) -> Result<FittedEffect, FileError> {
-    let name = section.required_text("name")?.value;
+    let name: String = section.read("name")?;
     let effect = Effect::find(library, &name);
     let effect = effect.map_err(|unknown| section.error_at("name", unknown.to_string()))?;
     let (key, joint) = match effect.is_coupling() {
         true => ("joints", pair(section, joints)?),
-        false => ("joint", one(section, joints)?),
+        false => (
+            "joint",
+            sections::joint(section, section.read("joint")?, joints)?,
+        ),
     };
     let mut known = vec!["name", key, "fixed", "status"];
     known.extend(effect.parameters.iter().map(|p| p.name.as_str()));
     section.only(&known)?;
-    let values = effect
-        .parameters
-        .iter()
-        .map(|p| value(section, p))
-        .collect::<Result<_, _>>()?;
-    let own = effect.parameters.iter().enumerate();
-    let own = own
-        .map(|(k, p)| per_log_values(section, k, p))
-        .collect::<Result<Vec<_>, _>>()?;
+    let (mut values, mut own) = (Vec::new(), Vec::new());
+    for (k, parameter) in effect.parameters.iter().enumerate() {
+        if parameter.per_log {
+            let (value, of_logs) = per_log(section.read(&parameter.name)?, k);
+            values.push(value);
+            own.extend(of_logs);
+        } else {
+            values.push(estimate(section.read(&parameter.name)?));
+        }
+    }
     Ok(FittedEffect {
         effect: effect.clone(),
         joint,
         values,
-        own: own.concat(),
-        fixed: section.flag("fixed")?,
-        status: status(section)?,
-    })
-}
-
-/// `joint = 2`
-fn one(section: &Section<'_>, joints: usize) -> Result<Joint, FileError> {
-    let joint = section.whole("joint")?.and_then(Joint::numbered);
-    joint.filter(|joint| joint.is_of(joints)).ok_or_else(|| {
-        section.error_at(
-            "joint",
-            format!("`joint` must be a number from 1 to {joints}"),
-        )
+        own,
+        fixed: section.read("fixed")?,
+        status: section.read("status")?,
     })
 }
 
 /// The first of `joints = [5, 6]`, two joints in a row.
 fn pair(section: &Section<'_>, joints: usize) -> Result<Joint, FileError> {
-    let given = section.numbers("joints")?.unwrap_or_default();
-    let is_it = |joint: &Joint| given == [*joint, joint.next()].map(|j| j.number() as f64);
+    let given: Vec<usize> = section.read("joints")?;
+    let is_it = |joint: &Joint| given == [joint.number(), joint.next().number()];
     let mut pairs = Joint::all(joints.saturating_sub(1));
     pairs.find(is_it).ok_or_else(|| {
         let message = format!(
@@ -78,65 +75,31 @@ fn pair(section: &Section<'_>, joints: usize) -> Result<Joint, FileError> {
     })
 }
 
-/// `status = "established"`, as closing the loop writes it.
-fn status(section: &Section<'_>) -> Result<Option<Status>, FileError> {
-    let Some(name) = section.text("status")? else {
-        return Ok(None);
-    };
-    let unknown = || {
-        let message = "`status` must be \"established\" or \"supported\"";
-        section.error_at("status", message.to_owned())
-    };
-    Status::named(&name.value).map(Some).ok_or_else(unknown)
-}
-
 /// `F_c = 0.16` or `F_c = { value = 0.16, ci95 = [0.15, 0.17] }`.
-fn value(
-    section: &Section<'_>,
-    parameter: &EffectParameter,
-) -> Result<(f64, Option<[f64; 2]>), FileError> {
-    let known: &[&str] = if parameter.per_log {
-        &["value", "ci95", "logs"]
-    } else {
-        &["value", "ci95"]
-    };
-    number_or_table(section, &parameter.name, known)
+fn estimate(given: OrTable<f64, ValueTable<'_>>) -> Estimate {
+    match given {
+        OrTable::Plain(value) => (value, None),
+        OrTable::Table(ValueTable { value, ci95, .. }) => (value, ci95.map(|Limits(ends)| ends)),
+    }
 }
 
-fn number_or_table(
-    section: &Section<'_>,
-    key: &str,
-    known: &[&str],
-) -> Result<(f64, Option<[f64; 2]>), FileError> {
-    if !section.is_table(key) {
-        return Ok((section.required_number(key)?, None));
-    }
-    let inner = section.required_section(key)?;
-    inner.only(known)?;
-    Ok((inner.required_number("value")?, interval(&inner, "ci95")?))
-}
-
-/// `q_z = { value = 0, logs = { "run1.csv" = { value = 0.012, ci95 = [0.011, 0.013] } } }`: per-log values.
-fn per_log_values(
-    section: &Section<'_>,
-    k: usize,
-    parameter: &EffectParameter,
-) -> Result<Vec<PerLogValue>, FileError> {
-    if !section.is_table(&parameter.name) {
-        return Ok(Vec::new());
-    }
-    let inner = section.required_section(&parameter.name)?;
-    let Some(logs) = inner.section("logs")? else {
-        return Ok(Vec::new());
+/// `q_z = { value = 0, logs = { "run1.csv" = { value = 0.012, ci95 = [0.011, 0.013] } } }`: the value of the `k`-th
+/// parameter, and its per-log values.
+fn per_log(given: OrTable<f64, PerLogTable<'_>>, k: usize) -> (Estimate, Vec<PerLogValue>) {
+    let table = match given {
+        OrTable::Plain(value) => return ((value, None), Vec::new()),
+        OrTable::Table(table) => table,
     };
-    let own = |log: &str| {
-        let (value, ci95) = number_or_table(&logs, log, &["value", "ci95"])?;
-        Ok(PerLogValue {
-            log: log.to_owned(),
+    let own = |(log, given)| {
+        let (value, ci95) = estimate(given);
+        PerLogValue {
+            log,
             parameter: k,
             value,
             ci95,
-        })
+        }
     };
-    logs.keys().map(own).collect()
+    let Named(logs) = table.logs;
+    let value = (table.value, table.ci95.map(|Limits(ends)| ends));
+    (value, logs.into_iter().map(own).collect())
 }

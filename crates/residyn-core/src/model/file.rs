@@ -9,7 +9,8 @@ use super::drive::Drive;
 use super::effect::Effect;
 use super::input_layout::InputLayout;
 use super::reader::{Document, FileError, Located, Section};
-use super::system::{Equations, Model, Motion};
+use super::system::{Energy, Equations, Model, Motion, Places};
+use super::tables::{ChainTable, EnergyTable, ModelFile};
 use super::{chain_in_file, effects_in_file, sections};
 use crate::data::{Joint, Quantity};
 use crate::expr::{Formula, Graph, Scope, parse};
@@ -24,58 +25,56 @@ impl Model {
     }
 
     fn from_document(document: &Document, library: &[Effect]) -> Result<Self, FileError> {
-        let top = document.parse()?;
-        top.only(&[
-            "system",
-            "columns",
-            "drive",
-            "parameters",
-            "dynamics",
-            "chain",
-            "energy",
-            "residual",
-            "effect",
-        ])?;
-        let section = top.required_section("system")?;
-        section.only(sections::SYSTEM_KEYS)?;
-        let joints = sections::joints(&section)?;
-        let joint_names = sections::joint_names(&section, joints)?;
-        let drive = top.section("drive")?;
-        let driven_by = match drive {
+        let file = ModelFile::of(document.parse()?)?;
+        let (top, system) = (file.section, file.system);
+        system.check_joints()?;
+        system.check_joint_names()?;
+        system.check_smoothing_velocity()?;
+        let prismatic = system.prismatic()?;
+        let joints = system.joints;
+        let driven_by = match file.drive {
             None => Quantity::Torque,
             Some(_) => Quantity::Command,
         };
-        let prismatic = sections::prismatic(&section, joints)?;
-        let system = Self {
-            name: section.required_text("name")?.value,
-            about: section.text_or_empty("about")?,
+        let parameters = file.parameters.0.iter();
+        let places = Places {
+            parameters: parameters.map(|(_, table)| table.section.at).collect(),
+            effects: file.effect.iter().map(|section| section.at).collect(),
+        };
+        let model = Self {
             joints,
-            smoothing_velocity: sections::smoothing_velocity(&section, joints)?,
-            columns: columns(top.section("columns")?, joints, driven_by, &joint_names)?,
-            joint_names,
-            parameters: sections::parameters(top.section("parameters")?)?,
-            effects: effects_in_file::read(&top, joints, library)?,
-            hidden: sections::hidden(top.section("residual")?, joints)?,
+            smoothing_velocity: system.smoothing_velocity,
+            name: system.name,
+            about: system.about.unwrap_or_default(),
+            columns: columns(file.columns, joints, driven_by, &system.joint_names)?,
+            joint_names: system.joint_names,
+            parameters: sections::parameters(file.parameters)?,
+            effects: effects_in_file::read(&file.effect, joints, library)?,
+            hidden: sections::hidden(file.residual, joints)?,
             text: document.text.clone(),
+            places,
             declaration: sections::declaration(document)?,
             equations: Arc::new(Equations {
-                lets: sections::lets(document, &top)?,
-                motion: motion(document, &top, &prismatic)?,
-                energy: sections::energy(top.section("energy")?)?,
-                drive: drive
-                    .map(|section| Drive::read(document, &section, joints))
+                lets: sections::lets(&top)?,
+                motion: motion(&top, file.chain, &prismatic)?,
+                energy: file
+                    .energy
+                    .map(|EnergyTable { total, power, .. }| Energy { total, power }),
+                drive: file
+                    .drive
+                    .map(|section| Drive::read(&section, joints))
                     .transpose()?,
             }),
             prismatic,
         };
-        system.check_names(&top)?;
-        system.check_formulas(document)?;
-        for (k, section) in top.sections("effect")?.iter().enumerate() {
-            let (present, rest) = system.effects.split_at(k);
-            let check = system.check_effect(&rest[0], present);
+        model.check_names(&top)?;
+        model.check_formulas(document)?;
+        for (k, section) in file.effect.iter().enumerate() {
+            let (present, rest) = model.effects.split_at(k);
+            let check = model.check_effect(&rest[0], present);
             check.map_err(|refused| section.error(refused.to_string()))?;
         }
-        Ok(system)
+        Ok(model)
     }
 
     /// Parameters and intermediates must not take the names of states, torques or each other.
@@ -98,7 +97,7 @@ impl Model {
                 taken.push(name.clone());
                 continue;
             };
-            let section = top.required_section(section)?;
+            let section: Section<'_> = top.read(section)?;
             return Err(section.error_at(name, format!("the name `{name}` {fault}")));
         }
         Ok(())
@@ -144,12 +143,8 @@ impl Model {
             lower(&scope, formula)?;
         }
         let names = self.drive_names();
-        let scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
-        for formula in self.equations.drive.iter().flat_map(Drive::formulas) {
-            let lowered = scope.lower(&mut graph, &formula.value);
-            lowered.map_err(|error| document.formula_error(formula.at, &error))?;
-        }
-        Ok(())
+        let mut drives = self.equations.drive.iter().flat_map(Drive::formulas);
+        drives.try_for_each(|drive| document.check_names(drive, names.iter().map(String::as_str)))
     }
 }
 
@@ -176,14 +171,17 @@ fn circle(lets: &[(String, Located<Formula>)], name: &str, next: &str) -> Option
 }
 
 /// Equations of motion given by formulas, or those of a chain of bodies.
-fn motion(document: &Document, top: &Section<'_>, prismatic: &[bool]) -> Result<Motion, FileError> {
-    let Some(chain) = top.section("chain")? else {
-        let dynamics = top.required_section("dynamics")?;
-        return sections::motion(document, &dynamics, prismatic.len());
+fn motion(
+    top: &Section<'_>,
+    chain: Option<ChainTable<'_>>,
+    prismatic: &[bool],
+) -> Result<Motion, FileError> {
+    let Some(chain) = chain else {
+        return sections::motion(&top.read("dynamics")?, prismatic.len());
     };
-    if let Some(dynamics) = top.section("dynamics")? {
+    if let Some(dynamics) = top.read::<Option<Section<'_>>>("dynamics")? {
         dynamics.only(&["let"])?;
     }
-    let bodies = chain_in_file::chain(document, &chain, prismatic)?;
+    let bodies = chain_in_file::bodies(chain, prismatic)?;
     Ok(Motion::Chain(Box::new(bodies)))
 }

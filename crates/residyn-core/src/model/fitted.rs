@@ -17,18 +17,12 @@ pub enum Status {
 }
 
 impl Status {
-    const ALL: [Self; 2] = [Self::Established, Self::Supported];
-
     /// As model files and reports write it.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Established => "established",
             Self::Supported => "supported",
         }
-    }
-
-    pub(super) fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|status| status.name() == name)
     }
 }
 

@@ -27,7 +27,9 @@ mod saved;
 mod sections;
 mod shift;
 mod system;
+mod tables;
 mod typeset;
+mod values;
 pub mod weights;
 mod written;
 

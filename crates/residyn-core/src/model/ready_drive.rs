@@ -8,6 +8,7 @@ use super::error::ModelError;
 use super::fitted::unit_on;
 use super::reader::{Document, FileError, Section};
 use super::sections;
+use super::tables::{DriveFile, DriveTable};
 use crate::data::{Joint, Quantity};
 use crate::expr::{Formula, Graph, Scope, SignForm, suggestion};
 
@@ -32,21 +33,19 @@ impl ReadyDrive {
     /// Unknown or missing key, formula error: with line, column and remedy.
     pub fn from_text(path: &Path, text: &str) -> Result<Self, FileError> {
         let document = Document::new(path, text);
-        let top = document.parse()?;
-        top.only(&["drive", "parameters"])?;
-        let section = top.required_section("drive")?;
-        section.only(&["name", "about", "torque"])?;
-        let missing = || section.error("`torque` is missing in [drive]");
-        let torque = section.formula("torque")?.ok_or_else(missing)?;
-        let given = sections::parameters(top.section("parameters")?)?;
-        let names = given.iter().map(|p| p.name.as_str());
-        let mut graph = Graph::new();
-        let scope = Scope::of_inputs(&mut graph, NAMES.into_iter().chain(names));
-        (scope.lower(&mut graph, &torque.value))
-            .map_err(|error| document.formula_error(torque.at, &error))?;
+        let file = DriveFile::of(document.parse()?)?;
+        let DriveTable {
+            name,
+            about,
+            torque,
+            section,
+        } = file.drive;
+        let given = sections::parameters(file.parameters)?;
+        let own = given.iter().map(|parameter| parameter.name.as_str());
+        document.check_names(&torque, NAMES.into_iter().chain(own))?;
         Ok(Self {
-            name: section.required_text("name")?.value,
-            about: section.required_text("about")?.value,
+            name,
+            about,
             torque: torque.value,
             parameters: entries(&section, text)?,
         })

@@ -1,4 +1,4 @@
-//! The tables of a model file, read one by one.
+//! What the tables of a model file say, checked.
 
 use std::collections::HashSet;
 
@@ -6,170 +6,146 @@ use toml_edit::{DocumentMut, TomlError};
 
 use super::network::check_hidden;
 use super::reader::{Document, FileError, Located, Section};
-use super::system::{Energy, Motion};
+use super::system::Motion;
+use super::tables::{ParameterTable, ResidualTable, SystemTable};
+use super::values::{Limits, Named};
 use super::{MlpSettings, Parameter};
+use crate::data::Joint;
 use crate::expr::Formula;
 use crate::limits::JOINTS;
 
-pub(super) const SYSTEM_KEYS: &[&str] = &[
-    "name",
-    "about",
-    "joints",
-    "joint_names",
-    "prismatic",
-    "smoothing_velocity",
-];
-const PARAMETER_KEYS: &[&str] = &[
-    "value", "unit", "about", "positive", "bounds", "fixed", "ci95",
-];
-
-pub(super) fn joints(section: &Section<'_>) -> Result<usize, FileError> {
-    match section.whole("joints")? {
-        Some(joints @ 1..=JOINTS) => Ok(joints),
-        Some(joints) => {
-            let message = format!("`joints` must be from 1 to {JOINTS}, found {joints}");
-            Err(section.error_at("joints", message))
+impl SystemTable<'_> {
+    pub fn check_joints(&self) -> Result<(), FileError> {
+        if (1..=JOINTS).contains(&self.joints) {
+            return Ok(());
         }
-        None => Err(section.error("`joints` is missing in [system]; give the number of joints")),
+        let message = format!("`joints` must be from 1 to {JOINTS}, found {}", self.joints);
+        Err(self.section.error_at("joints", message))
     }
-}
 
-/// One name per joint, all different; an empty list if not given.
-pub(super) fn joint_names(section: &Section<'_>, joints: usize) -> Result<Vec<String>, FileError> {
-    let Some(names) = section.texts("joint_names")? else {
-        return Ok(Vec::new());
-    };
-    let names: Vec<String> = names.into_iter().map(|name| name.value).collect();
-    let distinct: HashSet<&str> = names.iter().map(|name| name.trim()).collect();
-    if names.len() != joints || distinct.len() != joints || distinct.contains("") {
+    /// One name per joint, all different; an empty list if not given.
+    pub fn check_joint_names(&self) -> Result<(), FileError> {
+        let (names, joints) = (&self.joint_names, self.joints);
+        let distinct: HashSet<&str> = names.iter().map(|name| name.trim()).collect();
+        let is_one_each = names.len() == joints && distinct.len() == joints;
+        if names.is_empty() || is_one_each && !distinct.contains("") {
+            return Ok(());
+        }
         let message =
             format!("`joint_names` must be a list of {joints} different names, one per joint");
-        return Err(section.error_at("joint_names", message));
+        Err(self.section.error_at("joint_names", message))
     }
-    Ok(names)
-}
 
-/// `prismatic = [1]` lists the joints that slide.
-pub(super) fn prismatic(section: &Section<'_>, joints: usize) -> Result<Vec<bool>, FileError> {
-    let listed = section.numbers("prismatic")?.unwrap_or_default();
-    let numbers: Vec<f64> = (1..=joints).map(|j| j as f64).collect();
-    if let Some(stranger) = listed.iter().find(|j| !numbers.contains(j)) {
-        let message = format!("`prismatic` must list joints from 1 to {joints}, found {stranger}");
-        return Err(section.error_at("prismatic", message));
-    }
-    Ok(numbers.iter().map(|j| listed.contains(j)).collect())
-}
-
-/// One width per joint, above zero.
-pub(super) fn smoothing_velocity(
-    section: &Section<'_>,
-    joints: usize,
-) -> Result<Option<Vec<f64>>, FileError> {
-    let widths = section.numbers("smoothing_velocity")?;
-    match &widths {
-        Some(widths) if widths.len() != joints || widths.iter().any(|w| *w <= 0.0) => {
-            let message = format!(
-                "`smoothing_velocity` must be a list of {joints} speeds above zero, one per joint"
-            );
-            Err(section.error_at("smoothing_velocity", message))
+    /// `prismatic = [1]` lists the joints that slide.
+    pub fn prismatic(&self) -> Result<Vec<bool>, FileError> {
+        let joints = 1..=self.joints;
+        let mut listed = self.prismatic.iter();
+        if let Some(stranger) = listed.find(|joint| !joints.contains(joint)) {
+            let joints = self.joints;
+            let message =
+                format!("`prismatic` must list joints from 1 to {joints}, found {stranger}");
+            return Err(self.section.error_at("prismatic", message));
         }
-        _ => Ok(widths),
+        Ok(joints
+            .map(|joint| self.prismatic.contains(&joint))
+            .collect())
+    }
+
+    /// One width per joint, above zero.
+    pub fn check_smoothing_velocity(&self) -> Result<(), FileError> {
+        let joints = self.joints;
+        let is_one_each =
+            |widths: &Vec<f64>| widths.len() == joints && widths.iter().all(|width| *width > 0.0);
+        if self.smoothing_velocity.as_ref().is_none_or(is_one_each) {
+            return Ok(());
+        }
+        let message = format!(
+            "`smoothing_velocity` must be a list of {joints} speeds above zero, one per joint"
+        );
+        Err(self.section.error_at("smoothing_velocity", message))
     }
 }
 
-pub(super) fn parameters(section: Option<Section<'_>>) -> Result<Vec<Parameter>, FileError> {
-    let Some(section) = section else {
-        return Ok(Vec::new());
-    };
-    section
-        .named_sections()?
-        .into_iter()
-        .map(|(name, section)| parameter(name, &section))
-        .collect()
+pub(super) fn parameters(
+    Named(declared): Named<ParameterTable<'_>>,
+) -> Result<Vec<Parameter>, FileError> {
+    declared.into_iter().map(parameter).collect()
 }
 
-fn parameter(name: String, section: &Section<'_>) -> Result<Parameter, FileError> {
-    section.only(PARAMETER_KEYS)?;
-    let value = section.required_number("value")?;
-    let bounds = section.bounds()?;
-    if !(bounds[0]..=bounds[1]).contains(&value) {
-        let message = format!(
-            "`value` {value} is outside its bounds {} to {}",
-            bounds[0], bounds[1]
-        );
-        return Err(section.error_at("value", message));
+fn parameter((name, table): (String, ParameterTable<'_>)) -> Result<Parameter, FileError> {
+    let [low, high] = bounds(&table.section, table.positive, table.bounds)?;
+    let value = table.value;
+    if !(low..=high).contains(&value) {
+        let message = format!("`value` {value} is outside its bounds {low} to {high}");
+        return Err(table.section.error_at("value", message));
     }
     let parameter = Parameter {
         name,
         value,
-        unit: section.text_or_empty("unit")?,
-        bounds,
-        fixed: section.flag("fixed")?,
+        unit: table.unit.unwrap_or_default(),
+        bounds: [low, high],
+        fixed: table.fixed,
         per_log: false,
-        ci95: interval(section, "ci95")?,
+        ci95: table.ci95.map(|Limits(ends)| ends),
         scale: 1.0,
     };
     Ok(parameter.with_value(value))
 }
 
-/// A list of two numbers, if given.
-pub(super) fn interval(section: &Section<'_>, key: &str) -> Result<Option<[f64; 2]>, FileError> {
-    match section.limits(key)? {
-        None => Ok(None),
-        Some(numbers) => match numbers[..] {
-            [low, high] => Ok(Some([low, high])),
-            _ => Err(section.error_at(key, format!("`{key}` must be a list of two numbers"))),
-        },
+/// The admissible range that `positive` and `bounds` declare.
+pub(super) fn bounds(
+    section: &Section<'_>,
+    positive: bool,
+    bounds: Option<Limits>,
+) -> Result<[f64; 2], FileError> {
+    let lowest = if positive { 0.0 } else { f64::NEG_INFINITY };
+    match bounds {
+        None => Ok([lowest, f64::INFINITY]),
+        Some(Limits([low, high])) if low < high => Ok([low.max(lowest), high]),
+        Some(_) => {
+            let message = "`bounds` must be a list of two increasing numbers, such as [0, 2]";
+            Err(section.error_at("bounds", message))
+        }
     }
 }
 
-/// Widths of the hidden layers of the residual network; the published ones if the file gives none.
-pub(super) fn hidden(section: Option<Section<'_>>, joints: usize) -> Result<Vec<usize>, FileError> {
-    let default = MlpSettings::for_joints(joints).hidden;
-    let Some(section) = section else {
-        return Ok(default);
-    };
-    section.only(&["hidden"])?;
-    let Some(numbers) = section.numbers("hidden")? else {
-        return Ok(default);
-    };
-    // A number that is not whole becomes 0, which is not a valid width.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let width = |number: f64| {
-        if number.fract() == 0.0 {
-            number as usize
-        } else {
-            0
-        }
-    };
-    let hidden: Vec<usize> = numbers.into_iter().map(width).collect();
-    check_hidden(&hidden).map_err(|message| section.error_at("hidden", message))?;
-    Ok(hidden)
-}
-
-pub(super) fn lets(
-    document: &Document,
-    top: &Section<'_>,
-) -> Result<Vec<(String, Located<Formula>)>, FileError> {
-    let dynamics = top.section("dynamics")?;
-    let section = dynamics
-        .map(|dynamics| dynamics.section("let"))
-        .transpose()?;
-    let Some(section) = section.flatten() else {
-        return Ok(Vec::new());
-    };
-    section
-        .named_texts()?
-        .into_iter()
-        .map(|(name, text)| Ok((name, document.formula(&text)?)))
-        .collect()
-}
-
-pub(super) fn motion(
-    document: &Document,
-    dynamics: &Section<'_>,
+/// `joint = 2` of this many.
+pub(super) fn joint(
+    section: &Section<'_>,
+    number: usize,
     joints: usize,
-) -> Result<Motion, FileError> {
+) -> Result<Joint, FileError> {
+    let joint = Joint::numbered(number).filter(|joint| joint.is_of(joints));
+    joint.ok_or_else(|| {
+        let message = format!("`joint` must be a number from 1 to {joints}");
+        section.error_at("joint", message)
+    })
+}
+
+/// Widths of the hidden layers of the residual network; the published ones if the file gives none.
+pub(super) fn hidden(
+    table: Option<ResidualTable<'_>>,
+    joints: usize,
+) -> Result<Vec<usize>, FileError> {
+    let default = || MlpSettings::for_joints(joints).hidden;
+    let Some(table) = table else {
+        return Ok(default());
+    };
+    let hidden = table.hidden.unwrap_or_else(default);
+    match check_hidden(&hidden) {
+        Ok(()) => Ok(hidden),
+        Err(message) => Err(table.section.error_at("hidden", message)),
+    }
+}
+
+pub(super) fn lets(top: &Section<'_>) -> Result<Vec<(String, Located<Formula>)>, FileError> {
+    match top.read::<Option<Section<'_>>>("dynamics")? {
+        Some(dynamics) => dynamics.read("let").map(|Named(lets)| lets),
+        None => Ok(Vec::new()),
+    }
+}
+
+pub(super) fn motion(dynamics: &Section<'_>, joints: usize) -> Result<Motion, FileError> {
     let accelerations: Vec<String> = (1..=joints).map(|j| format!("qdd{j}")).collect();
     let mut known: Vec<&str> = vec!["let", "mass", "bias"];
     known.extend(accelerations.iter().map(String::as_str));
@@ -178,14 +154,12 @@ pub(super) fn motion(
         let formula = |key: &String| {
             let missing =
                 || dynamics.error(format!("`{key}` is missing; give it, or `mass` and `bias`"));
-            dynamics.formula(key)?.ok_or_else(missing)
+            dynamics.read::<Option<_>>(key)?.ok_or_else(missing)
         };
-        return Ok(Motion::Accelerations(
-            accelerations
-                .iter()
-                .map(formula)
-                .collect::<Result<_, _>>()?,
-        ));
+        let formulas = accelerations.iter().map(formula);
+        return formulas
+            .collect::<Result<_, _>>()
+            .map(Motion::Accelerations);
     }
     if let Some(both) = accelerations.iter().find(|key| dynamics.has(key)) {
         return Err(dynamics.error_at(
@@ -193,32 +167,15 @@ pub(super) fn motion(
             "give either accelerations or `mass` and `bias`, not both",
         ));
     }
-    let mass = dynamics.matrix("mass")?.unwrap_or_default();
-    let bias = dynamics.texts("bias")?.unwrap_or_default();
+    let mass: Vec<Vec<Located<Formula>>> = dynamics.read("mass")?;
+    let bias: Vec<Located<Formula>> = dynamics.read("bias")?;
     if mass.len() != joints || mass.iter().any(|row| row.len() != joints) || bias.len() != joints {
         let message = format!(
             "`mass` must be {joints} rows of {joints} formulas and `bias` {joints} formulas"
         );
         return Err(dynamics.error_at("mass", message));
     }
-    let row = |row: &Vec<Located<String>>| row.iter().map(|text| document.formula(text)).collect();
-    Ok(Motion::MassAndBias {
-        mass: mass.iter().map(row).collect::<Result<_, _>>()?,
-        bias: bias
-            .iter()
-            .map(|text| document.formula(text))
-            .collect::<Result<_, _>>()?,
-    })
-}
-
-pub(super) fn energy(section: Option<Section<'_>>) -> Result<Option<Energy>, FileError> {
-    let Some(section) = section else {
-        return Ok(None);
-    };
-    section.only(&["total", "power"])?;
-    let both = section.formula("total")?.zip(section.formula("power")?);
-    let (total, power) = both.ok_or_else(|| section.error("[energy] needs `total` and `power`"))?;
-    Ok(Some(Energy { total, power }))
+    Ok(Motion::MassAndBias { mass, bias })
 }
 
 /// The text of a file without its effects, wherever they stand.

@@ -72,6 +72,14 @@ pub struct Model {
     /// The text of the declared part of the file: everything but the effects.
     pub declaration: String,
     pub(super) equations: Arc<Equations>,
+    pub(super) places: Places,
+}
+
+/// Where the file has its parameters and its effects, in their order \[bytes\].
+#[derive(Debug, Clone)]
+pub(super) struct Places {
+    pub parameters: Vec<usize>,
+    pub effects: Vec<usize>,
 }
 
 impl Model {

@@ -1,18 +1,12 @@
 //! Torques and commands that move nothing.
 
-use super::places::Places;
-use super::{Finding, Kind, Severity};
+use super::{Finding, Kind};
 use crate::data::{Joint, Quantity};
 use crate::model::system::{Model, Motion};
 
-pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
+pub(super) fn find(model: &Model) -> Vec<Finding> {
     let equations = &model.equations;
-    let message = |at: Option<usize>, text: String| Finding {
-        severity: Severity::Warning,
-        kind: Kind::Input,
-        line: at.and_then(|at| places.line(at)),
-        text,
-    };
+    let message = |at: usize, text: String| Finding::new(Kind::Input, model.line(at), text);
     let mut findings = Vec::new();
     if let Motion::Accelerations(formulas) = &equations.motion {
         let used = model.reached(formulas.iter().flat_map(|formula| formula.value.names()));
@@ -23,7 +17,7 @@ pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
                     "no acceleration uses `{tau}`: neither the torque of joint {joint} nor an effect that acts as one, such \
                      as friction, moves anything"
                 );
-                findings.push(message(Some(formulas[joint].at), text));
+                findings.push(message(formulas[joint].at, text));
             }
         }
     }
@@ -38,7 +32,7 @@ pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
             if !used.contains(&command.as_str()) {
                 let text =
                     format!("no formula of [drive] uses `{command}`: that command moves nothing");
-                findings.push(message(Some(formulas[joint.index()].at), text));
+                findings.push(message(formulas[joint.index()].at, text));
             }
         }
     }

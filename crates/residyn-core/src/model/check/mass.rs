@@ -3,8 +3,7 @@
 use nalgebra::DMatrix;
 use rand::{Rng, RngExt};
 
-use super::places::Places;
-use super::{Finding, Kind, Severity};
+use super::{Finding, Kind};
 use crate::data::Joint;
 use crate::decomposition::eigen;
 use crate::model::system::{Model, Motion};
@@ -22,20 +21,18 @@ struct Sample {
     matrix: DMatrix<f64>,
 }
 
-pub(super) fn find(model: &Model, places: &Places, rng: &mut impl Rng) -> Vec<Finding> {
+pub(super) fn find(model: &Model, rng: &mut impl Rng) -> Vec<Finding> {
     let samples = samples(model, rng);
     let faults = [not_finite, not_symmetric, not_positive];
     // If entries are not finite, or the matrix is not symmetric, its eigenvalues mean nothing.
     let fault = faults.into_iter().find_map(|fault| fault(&samples));
     let line = match &model.equations.motion {
-        Motion::MassAndBias { mass, .. } => places.line(mass[0][0].at),
+        Motion::MassAndBias { mass, .. } => Some(model.line(mass[0][0].at)),
         _ => None,
     };
-    let finding = |(sample, text): (&Sample, String)| Finding {
-        severity: Severity::Error,
-        kind: Kind::Mass,
-        line,
-        text: format!("the mass matrix {text}, at {}", at(model, &sample.state)),
+    let finding = |(sample, text): (&Sample, String)| {
+        let text = format!("the mass matrix {text}, at {}", at(model, &sample.state));
+        Finding::new(Kind::Mass, line, text)
     };
     fault.map(finding).into_iter().collect()
 }

@@ -1,9 +1,9 @@
 //! Statements in a model file that can be read but cannot be meant: one file per kind of finding.
 
 mod inputs;
+mod lines;
 mod mass;
 mod names;
-mod places;
 mod power;
 mod units;
 mod unused;
@@ -14,7 +14,6 @@ use std::fmt;
 use rand::Rng;
 use serde::Serialize;
 
-use self::places::Places;
 use super::system::Model;
 use crate::layout::hanging;
 
@@ -74,14 +73,13 @@ impl Model {
     /// Look for statements in the model's file that cannot be meant. Its mass matrix is checked in states drawn from
     /// `rng`.
     pub fn check(&self, rng: &mut impl Rng) -> Check {
-        let places = Places::of(self);
         let mut findings = [
-            unused::find(self, &places),
-            inputs::find(self, &places),
-            mass::find(self, &places, rng),
-            power::find(self, &places, rng),
-            units::find(self, &places),
-            names::find(self, &places),
+            unused::find(self),
+            inputs::find(self),
+            mass::find(self, rng),
+            power::find(self, rng),
+            units::find(self),
+            names::find(self),
         ]
         .concat();
         findings.sort_by_key(|finding| (finding.severity, finding.line));
@@ -95,7 +93,7 @@ impl Model {
 
     /// Why rigid bodies cannot have its mass matrix, if so: accelerations are then not finite, or not physical.
     pub fn mass_fault(&self) -> Option<String> {
-        let found = mass::find(self, &Places::of(self), &mut crate::rng(0));
+        let found = mass::find(self, &mut crate::rng(0));
         found.into_iter().next().map(|finding| finding.text)
     }
 
@@ -109,6 +107,21 @@ impl Model {
             }
         }
         reached
+    }
+}
+
+impl Finding {
+    fn new(kind: Kind, line: impl Into<Option<usize>>, text: String) -> Self {
+        let severity = match kind {
+            Kind::Mass => Severity::Error,
+            _ => Severity::Warning,
+        };
+        Self {
+            severity,
+            kind,
+            line: line.into(),
+            text,
+        }
     }
 }
 

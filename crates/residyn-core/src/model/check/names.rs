@@ -1,7 +1,6 @@
 //! Names that hide others, or are easily taken for them.
 
-use super::places::Places;
-use super::{Finding, Kind, Severity};
+use super::{Finding, Kind};
 use crate::expr::is_function;
 use crate::model::effect::{COUPLING_NAMES, EFFECT_NAMES};
 use crate::model::system::Model;
@@ -9,24 +8,18 @@ use crate::model::system::Model;
 /// Quantities of joints, named with the joint's number.
 const NUMBERED: [&str; 6] = ["q", "qd", "qdd", "tau", "cmd", "load"];
 
-pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
-    let finding = |line: Option<usize>, text: String| Finding {
-        severity: Severity::Warning,
-        kind: Kind::Name,
-        line,
-        text,
-    };
+pub(super) fn find(model: &Model) -> Vec<Finding> {
+    let finding = |line: Option<usize>, text: String| Finding::new(Kind::Name, line, text);
     let parameters = model
         .parameters
         .iter()
         .map(|parameter| parameter.name.as_str());
     let lets = model.equations.lets.iter().map(|(name, _)| name.as_str());
-    let of_parameters =
-        parameters.filter_map(|name| Some(finding(places.parameter(name), taken_for(name)?)));
-    let of_lets =
-        lets.filter_map(|name| Some(finding(places.intermediate(name), taken_for(name)?)));
+    let of_parameters = parameters
+        .filter_map(|name| Some(finding(model.line_of_parameter(name), taken_for(name)?)));
+    let of_lets = lets.filter_map(|name| Some(finding(model.line_of_let(name), taken_for(name)?)));
     let of_effects = model.effects.iter().enumerate().flat_map(|(k, _)| {
-        let line = places.effect(k);
+        let line = model.line_of_effect(k);
         let texts = renamed(model, k).into_iter().chain(hiding(model, k));
         texts
             .map(move |text| finding(line, text))

@@ -5,8 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 
 use super::mass::{at, drawn};
-use super::places::Places;
-use super::{Finding, Kind, Severity};
+use super::{Finding, Kind};
 use crate::model::system::{Model, Motion};
 
 /// How long joints move along their velocities to find the slope of the mass matrix \[s\].
@@ -35,24 +34,22 @@ impl Powers {
     }
 }
 
-pub(super) fn find(model: &Model, places: &Places, rng: &mut impl Rng) -> Vec<Finding> {
+pub(super) fn find(model: &Model, rng: &mut impl Rng) -> Vec<Finding> {
     let Motion::MassAndBias { bias, .. } = &model.equations.motion else {
         return Vec::new();
     };
     let powers = powers(&model.with_effects(Vec::new()), rng);
     let differ = powers.into_iter().filter(|powers| powers.apart() > SAME);
     let worst = differ.max_by(|a, b| a.apart().total_cmp(&b.apart()));
-    let finding = |worst: Powers| Finding {
-        severity: Severity::Warning,
-        kind: Kind::Power,
-        line: places.line(bias[0].at),
-        text: format!(
+    let finding = |worst: Powers| {
+        let text = format!(
             "the velocity-product terms of `bias` take {:.4} W, but the mass matrix implies {:.4}: check their signs \
              and factors; at {}",
             worst.of_bias,
             worst.of_mass,
             at(model, &worst.state)
-        ),
+        );
+        Finding::new(Kind::Power, model.line(bias[0].at), text)
     };
     worst.map(finding).into_iter().collect()
 }

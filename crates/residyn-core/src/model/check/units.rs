@@ -6,8 +6,7 @@
 
 use std::collections::HashMap;
 
-use super::places::Places;
-use super::{Finding, Kind, Severity};
+use super::{Finding, Kind};
 use crate::data::Joint;
 use crate::expr::{Formula, Unit};
 use crate::model::effect::{Effect, Entry};
@@ -17,20 +16,20 @@ use crate::model::system::{Model, Motion};
 /// Names and their units, if they have one.
 type Names = HashMap<String, Option<Unit>>;
 
-pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
+pub(super) fn find(model: &Model) -> Vec<Finding> {
     let mut units = Units {
-        places,
+        model,
         names: Names::new(),
         findings: Vec::new(),
     };
-    units.parameters(model);
-    units.states(model);
-    units.drive(model);
-    units.intermediates(model);
-    units.motion(model);
-    units.energy(model);
+    units.parameters();
+    units.states();
+    units.drive();
+    units.intermediates();
+    units.motion();
+    units.energy();
     for (k, effect) in model.effects.iter().enumerate() {
-        units.effect(places.effect(k), &effect.effect);
+        units.effect(model.line_of_effect(k), &effect.effect);
     }
     units.findings
 }
@@ -54,13 +53,14 @@ fn of_joint(model: &Model, joint: Joint) -> [Unit; 2] {
 }
 
 struct Units<'p> {
-    places: &'p Places,
+    model: &'p Model,
     names: Names,
     findings: Vec<Finding>,
 }
 
 impl Units<'_> {
-    fn parameters(&mut self, model: &Model) {
+    fn parameters(&mut self) {
+        let model = self.model;
         for parameter in &model.parameters {
             let known = declared(&parameter.unit);
             if known.is_none() && !parameter.unit.is_empty() {
@@ -69,13 +69,14 @@ impl Units<'_> {
                      contain it are not checked",
                     parameter.unit, parameter.name
                 );
-                self.tell(self.places.parameter(&parameter.name), text);
+                self.tell(self.model.line_of_parameter(&parameter.name), text);
             }
             self.names.insert(parameter.name.clone(), known);
         }
     }
 
-    fn states(&mut self, model: &Model) {
+    fn states(&mut self) {
+        let model = self.model;
         for joint in Joint::all(model.joints) {
             let [q, force] = of_joint(model, joint);
             self.names.insert(joint.name("q"), Some(q));
@@ -85,7 +86,8 @@ impl Units<'_> {
         self.names.insert("t".to_owned(), Some(unit("s")));
     }
 
-    fn drive(&mut self, model: &Model) {
+    fn drive(&mut self) {
+        let model = self.model;
         let formulas = model
             .equations
             .drive
@@ -101,14 +103,16 @@ impl Units<'_> {
         }
     }
 
-    fn intermediates(&mut self, model: &Model) {
+    fn intermediates(&mut self) {
+        let model = self.model;
         for (name, formula) in &model.equations.lets {
             let unit = self.of(formula);
             self.names.insert(name.clone(), unit);
         }
     }
 
-    fn motion(&mut self, model: &Model) {
+    fn motion(&mut self) {
+        let model = self.model;
         let square = unit("s^2");
         let joints = || Joint::all(model.joints);
         match &model.equations.motion {
@@ -148,7 +152,8 @@ impl Units<'_> {
     }
 
     /// Both may be relative to an inertia: they only have to fit each other.
-    fn energy(&mut self, model: &Model) {
+    fn energy(&mut self) {
+        let model = self.model;
         if let Some(energy) = &model.equations.energy
             && let Some(total) = self.of(&energy.total)
         {
@@ -194,7 +199,7 @@ impl Units<'_> {
     /// The unit of a formula of the declared equations, whose misfits are reported.
     fn of(&mut self, formula: &Located<Formula>) -> Option<Unit> {
         let names = std::mem::take(&mut self.names);
-        let unit = self.unit(&formula.value, self.places.line(formula.at), &names);
+        let unit = self.unit(&formula.value, Some(self.model.line(formula.at)), &names);
         self.names = names;
         unit
     }
@@ -202,7 +207,7 @@ impl Units<'_> {
     /// A formula of the declared equations whose value should have this unit.
     fn expect(&mut self, what: &str, formula: &Located<Formula>, wanted: Unit) {
         let names = std::mem::take(&mut self.names);
-        let line = self.places.line(formula.at);
+        let line = Some(self.model.line(formula.at));
         self.fit(what, &formula.value, line, wanted, &names);
         self.names = names;
     }
@@ -236,11 +241,6 @@ impl Units<'_> {
     }
 
     fn tell(&mut self, line: Option<usize>, text: String) {
-        self.findings.push(Finding {
-            severity: Severity::Warning,
-            kind: Kind::Units,
-            line,
-            text,
-        });
+        self.findings.push(Finding::new(Kind::Units, line, text));
     }
 }

@@ -1,12 +1,11 @@
 //! Parameters and intermediates that no equation and no effect uses: fits cannot find them, and changing them does nothing.
 
-use super::places::Places;
-use super::{Finding, Kind, Severity};
+use super::{Finding, Kind};
 use crate::model::drive::Drive;
 use crate::model::effect::{Effect, Entry, PLACE, RATIO};
 use crate::model::system::Model;
 
-pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
+pub(super) fn find(model: &Model) -> Vec<Finding> {
     let equations = &model.equations;
     let motion = equations.motion.formulas();
     let drive = equations.drive.iter().flat_map(Drive::formulas);
@@ -32,16 +31,16 @@ pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
         }
     };
     let of_parameters = model.parameters.iter().filter_map(|parameter| {
-        let line = places.parameter(&parameter.name);
+        let line = model.line_of_parameter(&parameter.name);
         Some(finding(line, unused(&parameter.name)?))
     });
     // Intermediates of an energy need not occur in the equations of motion.
     let lets = equations.lets.iter().map(|(name, _)| name.as_str());
     let of_lets = lets
         .filter(|name| !in_energy.contains(name))
-        .filter_map(|name| Some(finding(places.intermediate(name), unused(name)?)));
+        .filter_map(|name| Some(finding(model.line_of_let(name), unused(name)?)));
     let of_effects = model.effects.iter().enumerate().flat_map(|(k, effect)| {
-        let line = places.effect(k);
+        let line = model.line_of_effect(k);
         let tell = move |text| finding(line, text);
         without_use(&effect.effect).into_iter().map(tell)
     });
@@ -75,10 +74,5 @@ fn without_use(effect: &Effect) -> Vec<String> {
 }
 
 fn finding(line: Option<usize>, text: String) -> Finding {
-    Finding {
-        severity: Severity::Warning,
-        kind: Kind::Unused,
-        line,
-        text,
-    }
+    Finding::new(Kind::Unused, line, text)
 }
