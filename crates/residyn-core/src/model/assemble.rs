@@ -24,15 +24,22 @@ impl Model {
         assembly.apply_torque_effects();
         assembly.apply_forces();
         let accelerations = assembly.accelerations();
-        let mut outputs = assembly.qd.clone();
-        outputs.extend(accelerations);
+        let outputs = [assembly.qd, accelerations].concat();
+        Dynamics {
+            reading,
+            ..self.compiled(assembly.graph.finish(&outputs))
+        }
+    }
+
+    /// A program with the values of the model's parameters.
+    fn compiled(&self, program: Program) -> Dynamics {
         Dynamics {
             name: self.name.clone(),
             joints: self.joints,
-            parameters: assembly.parameters,
-            program: assembly.graph.finish(&outputs),
+            parameters: self.all_parameters(),
+            program,
             filters: self.filters(),
-            reading,
+            reading: None,
             own: self.per_log_values(),
         }
     }
@@ -80,15 +87,8 @@ impl Model {
         };
         let differences: Vec<Node> = (0..self.joints).map(difference).collect();
         let program = graph.finish(&differences);
-        Some(Dynamics {
-            name: self.name.clone(),
-            joints: self.joints,
-            program: with_parameters_last(&program, self.joints, assembly.parameters.len()),
-            parameters: assembly.parameters,
-            filters: self.filters(),
-            reading: None,
-            own: self.per_log_values(),
-        })
+        let parameters = self.values().len();
+        Some(self.compiled(with_parameters_last(&program, self.joints, parameters)))
     }
 
     /// The mass matrix, row by row, and the bias as a program with the inputs of [`Dynamics`]; `None` for a model that
@@ -159,7 +159,6 @@ struct Assembly<'a> {
     effects: Vec<(&'a FittedEffect, Vec<Node>)>,
     sign: &'a [SignForm],
     graph: Graph,
-    parameters: Vec<Parameter>,
     /// The angle of the rig, once sensors are accounted for.
     q: Vec<Node>,
     qd: Vec<Node>,
@@ -201,7 +200,6 @@ impl<'a> Assembly<'a> {
             effects: with_nodes,
             sign,
             graph,
-            parameters,
             q,
             qd,
             tau,
@@ -230,16 +228,7 @@ impl<'a> Assembly<'a> {
         let Some(drive) = &self.system.equations.drive else {
             return;
         };
-        let mut scope = Scope::new(self.narrowest_sign());
-        for joint in Joint::all(self.system.joints) {
-            scope.bind(&joint.name("q"), self.q[joint]);
-            scope.bind(&joint.name("qd"), self.qd[joint]);
-            scope.bind(&joint.name(Quantity::Command.key()), self.tau[joint]);
-        }
-        scope.bind("t", self.time);
-        for (parameter, node) in self.system.parameters.iter().zip(&self.declared) {
-            scope.bind(&parameter.name, *node);
-        }
+        let scope = self.scope(&self.q, Quantity::Command);
         self.tau = drive.torques(&mut self.graph, &scope);
     }
 
@@ -281,16 +270,15 @@ impl<'a> Assembly<'a> {
         let is_load = |effect: &Effect| matches!(effect.entry, Entry::Payload(_));
         let (index, _, mass) = self.entries(is_load).pop()?;
         let mass = self.effect_node(index, mass);
-        let (effect, nodes) = &self.effects[index];
-        let names: Vec<&str> = effect
-            .effect
-            .parameters
-            .iter()
-            .map(|p| p.name.as_str())
-            .collect();
-        let node = |name: &str| names.iter().position(|own| *own == name).map(|k| nodes[k]);
-        let [x, y, z] = PLACE.map(|name| node(name).expect("checked when the file was read"));
+        let [x, y, z] = PLACE.map(|name| self.parameter(index, name));
         Some([mass, x, y, z])
+    }
+
+    /// A parameter that the effect needs by name.
+    fn parameter(&self, index: usize, name: &str) -> Node {
+        let (effect, nodes) = &self.effects[index];
+        let k = effect.effect.names().position(|own| own == name);
+        nodes[k.expect("checked when the file was read")]
     }
 
     /// The effects on sums of two joints.
@@ -304,9 +292,7 @@ impl<'a> Assembly<'a> {
     fn coupling(&mut self, index: usize) -> Coupling {
         let (effect, nodes) = (self.effects[index].0, self.effects[index].1.clone());
         let [joint, next] = [effect.joint, effect.joint.next()];
-        let names = effect.effect.parameters.iter().map(|p| p.name.as_str());
-        let ratio = names.zip(&nodes).find(|(name, _)| *name == RATIO);
-        let ratio = *ratio.expect("a coupling has a ratio").1;
+        let ratio = self.parameter(index, RATIO);
         let mut sum = |of: [Node; 2]| {
             let shared = self.graph.mul(ratio, of[1]);
             self.graph.add(of[0], shared)
@@ -355,9 +341,7 @@ impl<'a> Assembly<'a> {
         for (parameter, node) in effect.effect.parameters.iter().zip(nodes) {
             scope.bind(&parameter.name, *node);
         }
-        scope
-            .lower(&mut self.graph, formula)
-            .expect("formulas were checked when the file was read")
+        lower(&scope, &mut self.graph, formula)
     }
 
     fn accelerations(&mut self) -> Vec<Node> {
@@ -391,21 +375,19 @@ impl<'a> Assembly<'a> {
 
     /// The torques that these accelerations need.
     fn torques(&mut self, qdd: &[Node]) -> Option<Vec<Node>> {
-        let scope = self.declared_scope();
-        let (mut matrix, bias) = match &self.system.equations.motion {
-            Motion::Accelerations(_) => return None,
-            Motion::MassAndBias { mass, bias } => {
-                let rows = mass.iter().map(|row| self.lowered(&scope, row));
-                (rows.collect(), self.lowered(&scope, bias))
-            }
+        let (matrix, bias) = match &self.system.equations.motion {
             Motion::Chain(bodies) => {
+                let scope = self.declared_scope();
                 let none = vec![self.graph.constant(0.0); self.system.joints];
+                let mut matrix = vec![none; self.system.joints];
                 let payload = self.payload();
                 let mut links = bodies.loaded(&mut self.graph, &scope, payload);
-                (vec![none; self.system.joints], links.torques(&self.qd, qdd))
+                let bias = links.torques(&self.qd, qdd);
+                self.add_inertia(&mut matrix);
+                (matrix, bias)
             }
+            _ => self.mass_and_bias()?,
         };
-        self.add_inertia(&mut matrix);
         let needed = matrix.iter().zip(bias).map(|(row, bias)| {
             let accelerating = self.graph.dot(row, qdd);
             self.graph.add(accelerating, bias)
@@ -416,7 +398,7 @@ impl<'a> Assembly<'a> {
     fn lowered(&mut self, scope: &Scope, formulas: &[Located<Formula>]) -> Vec<Node> {
         let formulas = formulas.iter();
         formulas
-            .map(|formula| lower(scope, &mut self.graph, formula))
+            .map(|formula| lower(scope, &mut self.graph, &formula.value))
             .collect()
     }
 
@@ -471,26 +453,28 @@ impl<'a> Assembly<'a> {
         std::mem::replace(&mut self.q, before)
     }
 
-    /// The names in the declared equations: angles and torques after effects on them.
-    fn declared_scope(&mut self) -> Scope {
-        let angles = self.declared_angles();
+    /// The names of these angles, of the velocities, of what drives the joints, of time and of the declared parameters.
+    fn scope(&self, angles: &[Node], driven_by: Quantity) -> Scope {
         let mut scope = Scope::new(self.narrowest_sign());
         for joint in Joint::all(self.system.joints) {
             scope.bind(&joint.name("q"), angles[joint]);
             scope.bind(&joint.name("qd"), self.qd[joint]);
-            scope.bind(&joint.name("tau"), self.tau[joint]);
+            scope.bind(&joint.name(driven_by.key()), self.tau[joint]);
         }
         scope.bind("t", self.time);
-        self.give_directions(&mut scope);
         for (parameter, node) in self.system.parameters.iter().zip(&self.declared) {
             scope.bind(&parameter.name, *node);
         }
+        scope
+    }
+
+    /// The names in the declared equations: angles and torques after effects on them.
+    fn declared_scope(&mut self) -> Scope {
+        let angles = self.declared_angles();
+        let mut scope = self.scope(&angles, Quantity::Torque);
+        self.give_directions(&mut scope);
         self.bind_shifted(&mut scope);
-        for (name, formula) in &self.system.equations.lets {
-            let node = lower(&scope, &mut self.graph, formula);
-            self.graph.label(node, name);
-            scope.bind(name, node);
-        }
+        self.system.bind_lets(&mut self.graph, &mut scope);
         scope
     }
 
@@ -523,9 +507,9 @@ fn width(sign: &SignForm) -> f64 {
 }
 
 /// Lowers a formula into a graph; it was checked when the file was read.
-pub(super) fn lower(scope: &Scope, graph: &mut Graph, formula: &Located<Formula>) -> Node {
+pub(super) fn lower(scope: &Scope, graph: &mut Graph, formula: &Formula) -> Node {
     scope
-        .lower(graph, &formula.value)
+        .lower(graph, formula)
         .expect("formulas were checked when the file was read")
 }
 

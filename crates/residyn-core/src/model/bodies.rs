@@ -60,7 +60,7 @@ impl Bodies {
     pub fn constants(&self, graph: &mut Graph, scope: &Scope) -> Vec<Node> {
         let formulas = self.formulas();
         formulas
-            .map(|formula| lower(scope, graph, formula))
+            .map(|formula| lower(scope, graph, &formula.value))
             .collect()
     }
 
@@ -84,8 +84,9 @@ impl Bodies {
         scope: &Scope,
         payload: Option<[Node; 4]>,
     ) -> Links<'g> {
-        let gravity = std::array::from_fn(|a| lower(scope, graph, &self.gravity[a]));
-        let body = |body: &Body<Located<Formula>>| body.map(|formula| lower(scope, graph, formula));
+        let gravity = std::array::from_fn(|a| lower(scope, graph, &self.gravity[a].value));
+        let body =
+            |body: &Body<Located<Formula>>| body.map(|formula| lower(scope, graph, &formula.value));
         let mut bodies: Vec<Body<Node>> = self.bodies.iter().map(body).collect();
         if let (Some(payload), Some(last)) = (payload, bodies.last_mut()) {
             *last = with_point(graph, last, payload);

@@ -40,7 +40,7 @@ impl Drive {
     pub fn torques(&self, graph: &mut Graph, scope: &Scope) -> Vec<Node> {
         let formulas = self.0.iter();
         formulas
-            .map(|formula| lower(scope, graph, formula))
+            .map(|formula| lower(scope, graph, &formula.value))
             .collect()
     }
 }

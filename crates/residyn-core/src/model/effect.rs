@@ -1,3 +1,4 @@
+use super::assemble::lower;
 use super::error::ModelError;
 use super::filter::CommandFilter;
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm, suggestion};
@@ -66,6 +67,24 @@ pub enum Entry {
 }
 
 impl Entry {
+    /// Names that the formula may mention besides the effect's parameters.
+    pub(super) fn names(&self) -> &'static [&'static str] {
+        match self {
+            Self::Coupling(_) => &COUPLING_NAMES,
+            Self::Payload(_) => &[],
+            _ => &EFFECT_NAMES,
+        }
+    }
+
+    /// Parameters that the effect has by name: the share of the next joint, the position of a load.
+    pub(super) fn needed(&self) -> &'static [&'static str] {
+        match self {
+            Self::Coupling(_) => &[RATIO],
+            Self::Payload(_) => &PLACE,
+            _ => &[],
+        }
+    }
+
     /// The effect's formula, or the filter if it is one.
     pub(super) fn formula_or_filter(&self) -> Result<&Formula, CommandFilter> {
         match self {
@@ -130,6 +149,13 @@ pub struct EffectParameter {
 }
 
 impl Effect {
+    /// The names of its parameters.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.parameters
+            .iter()
+            .map(|parameter| parameter.name.as_str())
+    }
+
     /// Whether the effect couples its joint with the next one.
     pub fn is_coupling(&self) -> bool {
         matches!(self.entry, Entry::Coupling(_))
@@ -143,19 +169,17 @@ impl Effect {
         };
         let mut graph = Graph::new();
         let mut scope = Scope::new(sign);
-        let parameters = self.parameters.iter().map(|p| p.name.as_str());
-        for name in COUPLING_NAMES.into_iter().chain(parameters) {
+        for name in COUPLING_NAMES.into_iter().chain(self.names()) {
             let node = graph.input(name);
             scope.bind(name, node);
         }
-        let lowered = "formulas were checked when the file was read";
-        let force = scope.lower(&mut graph, formula).expect(lowered);
+        let force = lower(&scope, &mut graph, formula);
         let acceleration = scope.get("qdd").expect("bound above");
         let one = graph.constant(1.0);
         let slope = graph.gradient(&[force], &[one], &[acceleration])[0];
         let (inertia, rest) = (graph.neg(slope), graph.constant(0.0));
         scope.bind("qdd", rest);
-        let at_rest = scope.lower(&mut graph, formula).expect(lowered);
+        let at_rest = lower(&scope, &mut graph, formula);
         Some(graph.finish(&[at_rest, inertia]))
     }
 
@@ -174,16 +198,14 @@ impl Effect {
             return None;
         };
         let mut graph = Graph::new();
-        let parameters = || self.parameters.iter().map(|p| p.name.as_str());
-        let inputs = std::iter::once(variable).chain(parameters());
+        let inputs = std::iter::once(variable).chain(self.names());
         let scope = Scope::of_inputs(&mut graph, inputs);
-        let acting = scope.lower(&mut graph, formula);
-        let acting = acting.expect("formulas were checked when the file was read");
+        let acting = lower(&scope, &mut graph, formula);
         let force = match replaced.and_then(|name| scope.get(name)) {
             Some(commanded) => graph.sub(acting, commanded),
             None => acting,
         };
-        let parameters: Vec<Node> = parameters().filter_map(|name| scope.get(name)).collect();
+        let parameters: Vec<Node> = self.names().filter_map(|name| scope.get(name)).collect();
         let one = graph.constant(1.0);
         let slopes = graph.gradient(&[force], &[one], &parameters);
         Some((
@@ -240,17 +262,12 @@ impl Effect {
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
         let of_joint = EFFECT_NAMES.map(|name| (name, of_joint(name)));
-        let names = self.parameters.iter().map(|p| p.name.as_str());
-        for (name, value) in of_joint
-            .into_iter()
-            .chain(names.zip(values.iter().copied()))
-        {
+        let own = self.names().zip(values.iter().copied());
+        for (name, value) in of_joint.into_iter().chain(own) {
             let node = graph.constant(value);
             scope.bind(name, node);
         }
-        let node = scope
-            .lower(&mut graph, formula)
-            .expect("formulas were checked when the file was read");
+        let node = lower(&scope, &mut graph, formula);
         graph.finish(&[node]).eval(&[])[0]
     }
 

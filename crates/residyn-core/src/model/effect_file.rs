@@ -3,9 +3,7 @@
 use std::path::Path;
 use std::str::FromStr;
 
-use super::effect::{
-    COUPLING_NAMES, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure, PLACE, RATIO,
-};
+use super::effect::{Effect, EffectParameter, Entry, Measure};
 use super::reader::{Document, FileError, Located, Section};
 use super::sections;
 use super::tables::{EffectFile, EffectParameterTable, EffectTable};
@@ -21,10 +19,7 @@ impl Effect {
     /// # Errors
     /// Unknown or missing key, formula error: with line, column and remedy.
     pub fn from_text(path: &Path, text: &str) -> Result<Self, FileError> {
-        Self::from_document(&Document::new(path, text))
-    }
-
-    fn from_document(document: &Document) -> Result<Self, FileError> {
+        let document = Document::new(path, text);
         let EffectFile {
             effect: mut table,
             parameters: Named(parameters),
@@ -35,7 +30,7 @@ impl Effect {
         let parameters = parameters.collect::<Result<Vec<_>, _>>()?;
         let entry = entry(&mut table, &parameters)?;
         if let Some(condition) = &table.valid_if {
-            document.check_names(condition, names(&parameters))?;
+            (table.section).check_names("valid_if", &condition.value, names(&parameters))?;
         }
         if table.baseline == Some(0) {
             let message = "`baseline` must be a rank of at least 1; leave it out for an effect that few machines have";
@@ -68,93 +63,48 @@ impl FromStr for Effect {
 /// The one way in which the effect enters the equations; its formula is taken from the table.
 fn entry(table: &mut EffectTable<'_>, parameters: &[EffectParameter]) -> Result<Entry, FileError> {
     type Make = fn(Formula) -> Entry;
-    /// Key, formula, entry, names that the formula may mention, parameters that must be there.
-    type Way<'n> = (
-        &'n str,
-        Option<Located<Formula>>,
-        Make,
-        &'n [&'n str],
-        &'n [&'n str],
-    );
-    let ways: [Way<'_>; 7] = [
-        (
-            "force",
-            table.force.take(),
-            Entry::Force,
-            &EFFECT_NAMES,
-            &[],
-        ),
-        (
-            "torque",
-            table.torque.take(),
-            Entry::Torque,
-            &EFFECT_NAMES,
-            &[],
-        ),
-        (
-            "angle",
-            table.angle.take(),
-            Entry::Angle,
-            &EFFECT_NAMES,
-            &[],
-        ),
-        (
-            "inertia",
-            table.inertia.take(),
-            Entry::Inertia,
-            &EFFECT_NAMES,
-            &[],
-        ),
-        (
-            "reading",
-            table.reading.take(),
-            Entry::Reading,
-            &EFFECT_NAMES,
-            &[],
-        ),
-        (
-            "coupling",
-            table.coupling.take(),
-            Entry::Coupling,
-            &COUPLING_NAMES,
-            &[RATIO],
-        ),
-        ("payload", table.payload.take(), Entry::Payload, &[], &PLACE),
+    let formulas: [(&str, Option<Located<Formula>>, Make); 7] = [
+        ("force", table.force.take(), Entry::Force),
+        ("torque", table.torque.take(), Entry::Torque),
+        ("angle", table.angle.take(), Entry::Angle),
+        ("inertia", table.inertia.take(), Entry::Inertia),
+        ("reading", table.reading.take(), Entry::Reading),
+        ("coupling", table.coupling.take(), Entry::Coupling),
+        ("payload", table.payload.take(), Entry::Payload),
     ];
     let section = &table.section;
-    let mut found = command(table, parameters)?;
-    for (key, formula, make, known, needed) in ways {
-        let Some(formula) = formula else { continue };
-        if found.is_some() {
-            return Err(section.error_at(key, format!("an effect has {ONE_WAY}")));
-        }
-        let known = known.iter().copied().chain(names(parameters));
-        section.document.check_names(&formula, known)?;
-        let is_missing = |name: &&&str| !names(parameters).any(|own| own == **name);
-        if let Some(name) = needed.iter().find(is_missing) {
-            return Err(section.error_at(key, format!("`{key}` needs a parameter `{name}`")));
-        }
-        found = Some(make(formula.value));
+    let filter = table.command.map(|kind| ("command", Entry::Command(kind)));
+    let formulas = formulas
+        .into_iter()
+        .filter_map(|(key, formula, make)| Some((key, make(formula?.value))));
+    let mut ways = filter.into_iter().chain(formulas);
+    let Some((key, entry)) = ways.next() else {
+        return Err(section.error(format!("{ONE_WAY} is missing in [effect]")));
+    };
+    if let Some((second, _)) = ways.next() {
+        return Err(section.error_at(second, format!("an effect has {ONE_WAY}")));
     }
-    found.ok_or_else(|| section.error(format!("{ONE_WAY} is missing in [effect]")))
+    if let Some(formula) = entry.formula() {
+        let known = entry.names().iter().copied().chain(names(parameters));
+        section.check_names(key, formula, known)?;
+    } else if !is_one_time(parameters) {
+        let message =
+            "a filter of the command has one parameter, with `unit = \"s\"` and `positive = true`";
+        return Err(section.error_at(key, message));
+    }
+    let is_missing = |name: &&&str| !names(parameters).any(|own| own == **name);
+    match entry.needed().iter().find(is_missing) {
+        None => Ok(entry),
+        Some(name) => Err(section.error_at(key, format!("`{key}` needs a parameter `{name}`"))),
+    }
 }
 
 fn names(parameters: &[EffectParameter]) -> impl Iterator<Item = &str> {
     parameters.iter().map(|parameter| parameter.name.as_str())
 }
 
-/// `command = "delay"` or `"lag"`, with the time as the only parameter.
-fn command(
-    table: &EffectTable<'_>,
-    parameters: &[EffectParameter],
-) -> Result<Option<Entry>, FileError> {
-    let is_time = |parameters: &[EffectParameter]| matches!(parameters, [time] if time.unit == "s" && time.bounds[0] >= 0.0 && !time.whole);
-    if table.command.is_some() && !is_time(parameters) {
-        let message =
-            "a filter of the command has one parameter, with `unit = \"s\"` and `positive = true`";
-        return Err(table.section.error_at("command", message));
-    }
-    Ok(table.command.map(Entry::Command))
+fn is_one_time(parameters: &[EffectParameter]) -> bool {
+    matches!(parameters, [time] if time.unit == "s" && time.bounds[0] >= 0.0 && !time.whole)
 }
 
 fn parameter(

@@ -39,7 +39,7 @@ fn fitted(
         ),
     };
     let mut known = vec!["name", key, "fixed", "status"];
-    known.extend(effect.parameters.iter().map(|p| p.name.as_str()));
+    known.extend(effect.names());
     section.only(&known)?;
     let (mut values, mut own) = (Vec::new(), Vec::new());
     for (k, parameter) in effect.parameters.iter().enumerate() {

@@ -165,15 +165,6 @@ fn limited(largest: &[f64]) -> LayerWeights {
 }
 
 impl LayerWeights {
-    fn new(inputs: usize, weight: Vec<f64>, bias: Vec<f64>) -> Self {
-        Self {
-            inputs,
-            outputs: bias.len(),
-            weight,
-            bias,
-        }
-    }
-
     /// Two layers with the same inputs combined into one, the other's outputs after its own.
     fn above(&self, other: &Self) -> Self {
         let join = |a: &[f64], b: &[f64]| [a, b].concat();

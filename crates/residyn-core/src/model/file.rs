@@ -67,7 +67,7 @@ impl Model {
             }),
             prismatic,
         };
-        model.check_names(&top)?;
+        model.check_names(document)?;
         model.check_formulas(document)?;
         for (k, section) in file.effect.iter().enumerate() {
             let (present, rest) = model.effects.split_at(k);
@@ -78,17 +78,15 @@ impl Model {
     }
 
     /// Parameters and intermediates must not take the names of states, torques or each other.
-    fn check_names(&self, top: &Section<'_>) -> Result<(), FileError> {
+    fn check_names(&self, document: &Document) -> Result<(), FileError> {
         let mut taken: Vec<String> = self.input_names();
         taken.truncate(InputLayout::of(self.joints).parameters());
         taken.extend(Joint::all(self.joints).map(|joint| joint.name(Quantity::Command.key())));
-        let parameters = self.parameters.iter().map(|p| ("parameters", &p.name));
-        let lets = self
-            .equations
-            .lets
-            .iter()
-            .map(|(name, _)| ("dynamics", name));
-        for (section, name) in parameters.chain(lets) {
+        let parameters = self.parameters.iter().map(|parameter| &parameter.name);
+        let parameters = parameters.zip(self.places.parameters.iter().copied());
+        let lets = self.equations.lets.iter();
+        let lets = lets.map(|(name, formula)| (name, formula.at));
+        for (name, at) in parameters.chain(lets) {
             let fault = if !parse(name).is_ok_and(|formula| formula.is_name(name)) {
                 "cannot be used in formulas; use letters, digits and _"
             } else if taken.contains(name) {
@@ -97,8 +95,7 @@ impl Model {
                 taken.push(name.clone());
                 continue;
             };
-            let section: Section<'_> = top.read(section)?;
-            return Err(section.error_at(name, format!("the name `{name}` {fault}")));
+            return Err(document.error(at, format!("the name `{name}` {fault}")));
         }
         Ok(())
     }
@@ -144,7 +141,9 @@ impl Model {
         }
         let names = self.drive_names();
         let mut drives = self.equations.drive.iter().flat_map(Drive::formulas);
-        drives.try_for_each(|drive| document.check_names(drive, names.iter().map(String::as_str)))
+        drives.try_for_each(|Located { value, at }| {
+            document.check_names(*at, value, names.iter().map(String::as_str))
+        })
     }
 }
 

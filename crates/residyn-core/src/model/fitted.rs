@@ -1,8 +1,9 @@
 //! Effects as part of a model.
 
 use super::Parameter;
+use super::assemble::lower;
 use super::dynamics::PerLogValue;
-use super::effect::{COUPLING_NAMES, EFFECT_NAMES, Effect, Entry, Measure, RATIO};
+use super::effect::{Effect, Entry, Measure, RATIO};
 use super::filter::CommandFilter;
 use crate::data::{Joint, Quantity};
 use crate::expr::{Graph, Program, Scope, SignForm};
@@ -111,11 +112,7 @@ impl FittedEffect {
             let node = graph.input(name);
             scope.bind(&parameter.name, node);
         }
-        let known: &[&str] = match self.effect.is_coupling() {
-            true => &COUPLING_NAMES,
-            false => &EFFECT_NAMES,
-        };
-        for stem in known {
+        for stem in self.effect.entry.names() {
             let node = match (*stem, scope.get(RATIO)) {
                 ("t", _) => graph.input("t"),
                 (_, Some(ratio)) if self.effect.is_coupling() => {
@@ -128,9 +125,7 @@ impl FittedEffect {
             };
             scope.bind(stem, node);
         }
-        let node = scope
-            .lower(&mut graph, formula)
-            .expect("formulas were checked when the file was read");
+        let node = lower(&scope, &mut graph, formula);
         Ok(graph.finish(&[node]))
     }
 

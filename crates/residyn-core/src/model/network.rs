@@ -328,13 +328,17 @@ impl LayerWeights {
         self.outputs * (self.inputs + 1)
     }
 
-    pub(super) fn zero(inputs: usize, outputs: usize) -> Self {
+    pub(super) fn new(inputs: usize, weight: Vec<f64>, bias: Vec<f64>) -> Self {
         Self {
             inputs,
-            outputs,
-            weight: vec![0.0; inputs * outputs],
-            bias: vec![0.0; outputs],
+            outputs: bias.len(),
+            weight,
+            bias,
         }
+    }
+
+    pub(super) fn zero(inputs: usize, outputs: usize) -> Self {
+        Self::new(inputs, vec![0.0; inputs * outputs], vec![0.0; outputs])
     }
 
     fn random(inputs: usize, outputs: usize, rng: &mut impl Rng) -> Self {
@@ -345,12 +349,8 @@ impl LayerWeights {
                 .map(|_| f64::from(rng.random_range(-bound..=bound)))
                 .collect()
         };
-        Self {
-            inputs,
-            outputs,
-            weight: draw(inputs * outputs),
-            bias: draw(outputs),
-        }
+        let weight = draw(inputs * outputs);
+        Self::new(inputs, weight, draw(outputs))
     }
 }
 

@@ -9,7 +9,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::values::Read;
-use crate::expr::{Formula, FormulaError, Graph, Scope, parse_finite, suggestion};
+use crate::expr::{Formula, FormulaError, parse_finite, suggestion};
 use crate::limits::{MODEL_NAMES, MODEL_TERMS};
 use crate::toml_text::check_size;
 
@@ -133,15 +133,12 @@ impl Document {
     /// Refuse a formula that mentions names other than `known`.
     pub fn check_names<'n>(
         &self,
-        formula: &Located<Formula>,
+        at: usize,
+        formula: &Formula,
         known: impl IntoIterator<Item = &'n str>,
     ) -> Result<(), FileError> {
-        let mut graph = Graph::new();
-        let scope = Scope::of_inputs(&mut graph, known);
-        match scope.lower(&mut graph, &formula.value) {
-            Ok(_) => Ok(()),
-            Err(error) => Err(self.formula_error(formula.at, &error)),
-        }
+        let lowered = formula.program(known);
+        lowered.map_or_else(|error| Err(self.formula_error(at, &error)), |_| Ok(()))
     }
 }
 
@@ -220,9 +217,23 @@ impl<'a> Section<'a> {
 
     /// An error at the value of `key`.
     pub fn error_at(&self, key: &str, message: impl Into<String>) -> FileError {
+        self.document.error(self.place(key), message)
+    }
+
+    /// Refuse a formula, the value of `key`, that mentions names other than `known`.
+    pub fn check_names<'n>(
+        &self,
+        key: &str,
+        formula: &Formula,
+        known: impl IntoIterator<Item = &'n str>,
+    ) -> Result<(), FileError> {
+        self.document.check_names(self.place(key), formula, known)
+    }
+
+    /// Where the value of `key` starts, or else the table.
+    fn place(&self, key: &str) -> usize {
         let value = self.table.get(key);
-        let at = value.map_or(self.at, |value| value.span().start);
-        self.document.error(at, message)
+        value.map_or(self.at, |value| value.span().start)
     }
 
     fn check_count(&self, at: usize, entries: usize) -> Result<(), FileError> {

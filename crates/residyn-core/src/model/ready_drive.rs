@@ -4,6 +4,7 @@ use std::path::Path;
 
 use toml_edit::{DocumentMut, InlineTable, Item, Table};
 
+use super::assemble::lower;
 use super::error::ModelError;
 use super::fitted::unit_on;
 use super::reader::{Document, FileError, Section};
@@ -42,7 +43,7 @@ impl ReadyDrive {
         } = file.drive;
         let given = sections::parameters(file.parameters)?;
         let own = given.iter().map(|parameter| parameter.name.as_str());
-        document.check_names(&torque, NAMES.into_iter().chain(own))?;
+        document.check_names(torque.at, &torque.value, NAMES.into_iter().chain(own))?;
         Ok(Self {
             name,
             about,
@@ -125,9 +126,7 @@ impl ReadyDrive {
             let node = graph.input(&own_name(name, joint));
             scope.bind(name, node);
         }
-        let node = scope
-            .lower(&mut graph, &self.torque)
-            .expect("formulas were checked when the file was read");
+        let node = lower(&scope, &mut graph, &self.torque);
         graph.finish(&[node]).formula(0)
     }
 }

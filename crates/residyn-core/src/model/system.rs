@@ -1,6 +1,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::assemble::lower;
 use super::bodies::Bodies;
 use super::chain::{Body, Recovered};
 use super::drive::Drive;
@@ -336,6 +337,15 @@ impl Model {
         !matches!(self.equations.motion, Motion::Accelerations(_))
     }
 
+    /// The intermediates, under their names.
+    pub(super) fn bind_lets(&self, graph: &mut Graph, scope: &mut Scope) {
+        for (name, formula) in &self.equations.lets {
+            let node = lower(scope, graph, &formula.value);
+            graph.label(node, name);
+            scope.bind(name, node);
+        }
+    }
+
     /// Total energy and the power of the torques as a program of the inputs of a compiled model, if the file states
     /// them or its equations are those of a chain: `[total, power, d total/dq.., d total/dqd..]`.
     pub fn energy_program(&self) -> Option<crate::expr::Program> {
@@ -353,17 +363,12 @@ impl Model {
         }
         let states = names[..2 * self.joints].iter();
         let states: Vec<Node> = states.filter_map(|name| scope.get(name)).collect();
-        let mut lower = |scope: &Scope, formula: &Located<Formula>| {
-            scope
-                .lower(&mut graph, &formula.value)
-                .expect("formulas were checked when the file was read")
-        };
-        for (name, formula) in &self.equations.lets {
-            let node = lower(&scope, formula);
-            scope.bind(name, node);
-        }
+        self.bind_lets(&mut graph, &mut scope);
         let (total, power) = match (&self.equations.energy, &self.equations.motion) {
-            (Some(energy), _) => (lower(&scope, &energy.total), lower(&scope, &energy.power)),
+            (Some(Energy { total, power }), _) => {
+                let mut lower = |formula: &Located<_>| lower(&scope, &mut graph, &formula.value);
+                (lower(total), lower(power))
+            }
             (None, Motion::Chain(bodies)) => bodies.energy(&mut graph, &scope),
             _ => return None,
         };
@@ -399,13 +404,7 @@ impl Model {
         let mut graph = Graph::new();
         let names = self.parameters.iter().map(|p| p.name.as_str());
         let mut scope = Scope::of_inputs(&mut graph, names);
-        for (name, formula) in &self.equations.lets {
-            let node = scope.lower(&mut graph, &formula.value);
-            scope.bind(
-                name,
-                node.expect("formulas were checked when the file was read"),
-            );
-        }
+        self.bind_lets(&mut graph, &mut scope);
         let nodes = bodies.constants(&mut graph, &scope);
         let numbers = graph.finish(&nodes).eval(&values[..self.parameters.len()]);
         Some(bodies.mechanism(&numbers))

@@ -27,9 +27,8 @@ impl Model {
                 .collect()
         };
         let column = |stem: &str| -> Vec<String> {
-            (1..=self.joints)
-                .map(|j| latex_name(&format!("{stem}{j}")))
-                .collect()
+            let joints = Joint::all(self.joints);
+            joints.map(|joint| latex_name(&joint.name(stem))).collect()
         };
         match &self.equations.motion {
             Motion::Accelerations(formulas) => {
@@ -54,9 +53,7 @@ impl Model {
         }
         lines
     }
-}
 
-impl Model {
     /// The drives' torques, if there are any drives.
     fn drive_lines(&self) -> Vec<String> {
         let names = self.drive_names();
@@ -83,9 +80,7 @@ impl FittedEffect {
             }
         }
     }
-}
 
-impl FittedEffect {
     /// How it enters the equations, in words; `typeset` says how a quantity such as `tau1` is written.
     pub fn enters(&self, typeset: impl Fn(&str) -> String) -> String {
         let of_joint = |stem: &str| typeset(&self.joint.name(stem));

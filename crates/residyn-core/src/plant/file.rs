@@ -312,8 +312,8 @@ impl Plant {
             .collect();
         for (key, value) in values {
             let Some(k) = effect.parameters.iter().position(|p| p.name == *key) else {
-                let near = suggestion(key, effect.parameters.iter().map(|p| p.name.as_str()));
-                let known: Vec<&str> = effect.parameters.iter().map(|p| p.name.as_str()).collect();
+                let near = suggestion(key, effect.names());
+                let known: Vec<&str> = effect.names().collect();
                 return Err(PlantError::EffectParameter {
                     effect: name.to_owned(),
                     name: key.clone(),

@@ -2,7 +2,6 @@
 
 use super::{Finding, Kind};
 use crate::expr::is_function;
-use crate::model::effect::{COUPLING_NAMES, EFFECT_NAMES};
 use crate::model::system::Model;
 
 /// Quantities of joints, named with the joint's number.
@@ -62,14 +61,8 @@ fn renamed(model: &Model, k: usize) -> Vec<String> {
 /// Parameters of the k-th effect that hide the motion of the joint from its own formula.
 fn hiding(model: &Model, k: usize) -> Vec<String> {
     let effect = &model.effects[k].effect;
-    let known = match effect.is_coupling() {
-        true => COUPLING_NAMES.as_slice(),
-        false => EFFECT_NAMES.as_slice(),
-    };
-    let names = effect
-        .parameters
-        .iter()
-        .map(|parameter| parameter.name.as_str());
+    let known = effect.entry.names();
+    let names = effect.names();
     names
         .filter(|name| known.contains(name) || is_function(name))
         .map(|name| {

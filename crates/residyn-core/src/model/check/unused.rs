@@ -2,7 +2,7 @@
 
 use super::{Finding, Kind};
 use crate::model::drive::Drive;
-use crate::model::effect::{Effect, Entry, PLACE, RATIO};
+use crate::model::effect::Effect;
 use crate::model::system::Model;
 
 pub(super) fn find(model: &Model) -> Vec<Finding> {
@@ -53,16 +53,8 @@ fn without_use(effect: &Effect) -> Vec<String> {
         return Vec::new();
     };
     let mut used = formula.names();
-    match effect.entry {
-        Entry::Payload(_) => used.extend(PLACE),
-        Entry::Coupling(_) => used.push(RATIO),
-        _ => {}
-    }
-    let names = effect
-        .parameters
-        .iter()
-        .map(|parameter| parameter.name.as_str());
-    let unused = names.filter(|name| !used.contains(name));
+    used.extend(effect.entry.needed());
+    let unused = effect.names().filter(|name| !used.contains(name));
     unused
         .map(|name| {
             format!(
