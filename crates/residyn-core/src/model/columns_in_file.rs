@@ -14,56 +14,49 @@ pub(super) fn columns(
     driven_by: Quantity,
     joint_names: &[String],
 ) -> Result<Columns, FileError> {
-    let mut columns = Columns {
+    let standard = Columns {
         joint_names: joint_names.to_vec(),
         ..Columns::standard(joints, driven_by)
     };
     let Some(section) = section else {
-        return Ok(columns);
+        return Ok(standard);
     };
-    let [time, q, qd, driven] = [
-        Quantity::Time,
-        Quantity::Angle,
-        Quantity::Velocity,
-        driven_by,
-    ]
-    .map(Quantity::key);
-    section.only(&["topic", time, q, qd, driven])?;
-    columns.topic = section.read("topic")?;
-    if let Some(entry) = section.read(time)? {
-        columns.time = column(entry, Quantity::Time)?;
-    }
-    let given = |quantity: Quantity| section.read::<Option<Vec<Entry<'_>>>>(quantity.key());
-    let list = |entries, quantity| list(&section, entries, quantity, joints);
-    if let Some(entries) = given(Quantity::Angle)? {
-        columns.q = list(entries, Quantity::Angle)?;
-    }
-    if let Some(entries) = given(driven_by)? {
-        columns.tau = list(entries, driven_by)?;
-    }
-    if let Some(entries) = given(Quantity::Velocity)? {
+    let quantities = [Quantity::Angle, Quantity::Velocity, driven_by];
+    let [q, qd, driven] = quantities.map(Quantity::key);
+    section.only(&["topic", "time", q, qd, driven])?;
+    let time = section.read::<Option<Entry<'_>>>("time")?;
+    let time = time
+        .map(|entry| column(entry, Quantity::Time))
+        .transpose()?;
+    let [q, qd, tau] = quantities.map(|quantity| list(&section, quantity, joints));
+    Ok(Columns {
+        topic: section.read("topic")?,
+        time: time.unwrap_or(standard.time),
+        q: q?.unwrap_or(standard.q),
         // An empty list says that no column holds velocities.
-        let is_given = !entries.is_empty();
-        let velocities = is_given.then(|| list(entries, Quantity::Velocity));
-        columns.qd = velocities.transpose()?;
-    }
-    Ok(columns)
+        qd: qd?.or(standard.qd).filter(|columns| !columns.is_empty()),
+        tau: tau?.unwrap_or(standard.tau),
+        ..standard
+    })
 }
 
-/// One column per joint.
+/// One column per joint, or none for velocities.
 fn list(
     section: &Section<'_>,
-    entries: Vec<Entry<'_>>,
     quantity: Quantity,
     joints: usize,
-) -> Result<Vec<Column>, FileError> {
-    if entries.len() != joints {
-        let (key, found) = (quantity.key(), entries.len());
+) -> Result<Option<Vec<Column>>, FileError> {
+    let key = quantity.key();
+    let Some(entries) = section.read::<Option<Vec<Entry<'_>>>>(key)? else {
+        return Ok(None);
+    };
+    let found = entries.len();
+    if found != joints && !(found == 0 && quantity == Quantity::Velocity) {
         let message = format!("`{key}` needs one column per joint: {joints}, found {found}");
         return Err(section.error_at(key, message));
     }
     let columns = entries.into_iter().map(|entry| column(entry, quantity));
-    columns.collect()
+    columns.collect::<Result<_, _>>().map(Some)
 }
 
 fn column(entry: Entry<'_>, quantity: Quantity) -> Result<Column, FileError> {

@@ -54,13 +54,9 @@ impl Model {
         }
     }
 
-    /// The names that formulas of `[drive]` may use, in the order of a compiled model's inputs.
+    /// The names that formulas of `[drive]` may use.
     pub(super) fn drive_names(&self) -> Vec<String> {
-        let stems = ["q", "qd", Quantity::Command.key()];
-        let of_stem = |stem| Joint::all(self.joints).map(move |joint| joint.name(stem));
-        let states = stems.into_iter().flat_map(of_stem);
-        let parameters = self.parameters.iter().map(|p| p.name.clone());
-        states.chain(["t".to_owned()]).chain(parameters).collect()
+        self.names_under(Quantity::Command)
     }
 
     /// The drives' torques along a log (`[joint][row]`, N m or N), at the declared values, before any effect; the log's

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
-use super::network::{LayerWeights, MlpWeights};
+use super::network::{LayerWeights, MlpWeights, to_f32};
 use super::residual::{nothing_but, with_residual};
 
 /// A feature that the others determine keeps this share of its own spread: sensors are not exact.
@@ -126,15 +126,9 @@ impl MlpWeights {
     }
 
     /// With every number rounded to f32.
-    pub fn rounded(mut self) -> Self {
-        for layer in &mut self.layers {
-            for number in layer.weight.iter_mut().chain(&mut layer.bias) {
-                #[allow(clippy::cast_possible_truncation)]
-                let rounded = f64::from(*number as f32);
-                *number = rounded;
-            }
-        }
-        self
+    fn rounded(&self) -> Self {
+        let flat: Vec<f64> = (to_f32(&self.flat()).into_iter().map(f64::from)).collect();
+        self.with_flat(&flat)
     }
 }
 

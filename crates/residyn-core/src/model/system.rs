@@ -10,7 +10,7 @@ use super::effect::{Effect, Entry, Measure};
 use super::error::ModelError;
 use super::fitted::FittedEffect;
 use super::reader::Located;
-use crate::data::{Columns, Joint, Log, LogError};
+use crate::data::{Columns, Joint, Log, LogError, Quantity};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
 /// Speed over which dry friction reverses (rad/s or m/s), unless the file or a fit to logs sets another one.
@@ -109,15 +109,15 @@ impl Model {
 
     /// The names that formulas of the motion may use before any `let`: states, torques, time, parameters.
     pub fn input_names(&self) -> Vec<String> {
-        let numbered = |stem: &str| {
-            (1..=self.joints)
-                .map(move |j| format!("{stem}{j}"))
-                .collect::<Vec<_>>()
-        };
-        let mut names = [numbered("q"), numbered("qd"), numbered("tau")].concat();
-        names.push("t".into());
-        names.extend(self.parameters.iter().map(|p| p.name.clone()));
-        names
+        self.names_under(Quantity::Torque)
+    }
+
+    /// States, torques or commands, time and parameters, in the order of a compiled model's inputs.
+    pub(super) fn names_under(&self, driven_by: Quantity) -> Vec<String> {
+        let of_stem = |stem| Joint::all(self.joints).map(move |joint| joint.name(stem));
+        let states = ["q", "qd", driven_by.key()].into_iter().flat_map(of_stem);
+        let parameters = self.parameters.iter().map(|p| p.name.clone());
+        states.chain(["t".to_owned()]).chain(parameters).collect()
     }
 
     /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump.
@@ -350,10 +350,7 @@ impl Model {
     /// them or its equations are those of a chain: `[total, power, d total/dq.., d total/dqd..]`.
     pub fn energy_program(&self) -> Option<crate::expr::Program> {
         let mut graph = Graph::new();
-        let names = match self.equations.drive {
-            None => self.input_names(),
-            Some(_) => self.drive_names(),
-        };
+        let names = self.names_under(self.driven_by());
         let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
         if let Some(drive) = &self.equations.drive {
             let torques = drive.torques(&mut graph, &scope);

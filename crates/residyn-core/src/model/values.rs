@@ -170,16 +170,13 @@ impl Read<'_> for f64 {
 
     fn read(entry: Entry<'_, '_>) -> Result<Self, FileError> {
         let number = number(entry)?;
-        let message = || {
-            format!(
-                "`{}` is not a finite number; write one, such as 0.25",
-                entry.key
-            )
-        };
-        match number.is_finite() {
-            true => Ok(number),
-            false => Err(entry.error(message())),
+        if number.is_finite() {
+            return Ok(number);
         }
+        let key = entry.key;
+        Err(entry.error(format!(
+            "`{key}` is not a finite number; write one, such as 0.25"
+        )))
     }
 }
 

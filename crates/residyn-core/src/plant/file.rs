@@ -324,12 +324,8 @@ impl Plant {
             own[k].0 = *value;
         }
         let new = FittedEffect {
-            effect: effect.clone(),
-            joint,
             values: own,
-            own: Vec::new(),
-            fixed: false,
-            status: None,
+            ..FittedEffect::absent(effect, joint)
         };
         self.system.check_effect(&new, &self.effects)?;
         self.effects.push(new);
