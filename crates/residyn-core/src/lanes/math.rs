@@ -252,13 +252,6 @@ impl<S: Simd, T: Element> Vector<S, T> {
 
     #[inline(always)]
     fn if_bit(self, bit: u32, then: Self, otherwise: Self) -> Self {
-        let mask = T::bit(self.simd, self.register, bit);
-        let chosen = T::select(self.simd, mask, then.register, otherwise.register);
-        Self::new(self.simd, chosen)
-    }
-
-    #[inline(always)]
-    fn power_of_two(self) -> Self {
-        Self::new(self.simd, T::power_of_two(self.simd, self.register))
+        then.where_in(T::bit(self.simd, self.register, bit), otherwise)
     }
 }

@@ -100,55 +100,24 @@ impl<S: Simd, T: Element> Vector<S, T> {
         )
     }
 
-    /// self * factor + term
-    #[inline(always)]
-    pub fn mul_add(self, factor: Self, term: Self) -> Self {
-        let register =
-            <T as Element>::mul_add(self.simd, self.register, factor.register, term.register);
-        Self::new(self.simd, register)
-    }
-
-    #[inline(always)]
-    pub fn abs(self) -> Self {
-        Self::new(self.simd, <T as Element>::abs(self.simd, self.register))
-    }
-
-    #[inline(always)]
-    pub fn sqrt(self) -> Self {
-        Self::new(self.simd, <T as Element>::sqrt(self.simd, self.register))
-    }
-
-    /// The minimum; with a NaN the result depends on the processor.
-    #[inline(always)]
-    pub fn min(self, other: Self) -> Self {
-        Self::new(
-            self.simd,
-            <T as Element>::min(self.simd, self.register, other.register),
-        )
-    }
-
-    /// The maximum; with a NaN the result depends on the processor.
-    #[inline(always)]
-    pub fn max(self, other: Self) -> Self {
-        Self::new(
-            self.simd,
-            <T as Element>::max(self.simd, self.register, other.register),
-        )
-    }
-
     /// `then` where `self < other`, else `otherwise`; false for a NaN.
     #[inline(always)]
     pub fn if_less(self, other: Self, then: Self, otherwise: Self) -> Self {
         let mask = <T as Element>::less(self.simd, self.register, other.register);
-        let chosen = <T as Element>::select(self.simd, mask, then.register, otherwise.register);
-        Self::new(self.simd, chosen)
+        then.where_in(mask, otherwise)
     }
 
     /// `then` where `self == other`, else `otherwise`; false for a NaN.
     #[inline(always)]
     pub fn if_equal(self, other: Self, then: Self, otherwise: Self) -> Self {
         let mask = <T as Element>::equal(self.simd, self.register, other.register);
-        let chosen = <T as Element>::select(self.simd, mask, then.register, otherwise.register);
+        then.where_in(mask, otherwise)
+    }
+
+    /// `self` in the lanes of a mask, else `otherwise`.
+    #[inline(always)]
+    pub(super) fn where_in(self, mask: T::Mask<S>, otherwise: Self) -> Self {
+        let chosen = <T as Element>::select(self.simd, mask, self.register, otherwise.register);
         Self::new(self.simd, chosen)
     }
 
@@ -157,13 +126,6 @@ impl<S: Simd, T: Element> Vector<S, T> {
     pub fn any_less(self, other: Self) -> bool {
         let mask = <T as Element>::less(self.simd, self.register, other.register);
         <T as Element>::any(self.simd, mask)
-    }
-
-    /// The magnitude of `self` with the sign of `sign`.
-    #[inline(always)]
-    pub fn with_sign_of(self, sign: Self) -> Self {
-        let register = <T as Element>::with_sign_of(self.simd, self.register, sign.register);
-        Self::new(self.simd, register)
     }
 
     /// Apply a scalar function to each lane.
@@ -192,38 +154,59 @@ impl<S: Simd, T: Element> Vector<S, T> {
     }
 }
 
-macro_rules! operator {
-    ($operator:ident, $method:ident) => {
+macro_rules! methods {
+    ($($(#[$doc:meta])* $method:ident($($other:ident),*);)*) => {
+        impl<S: Simd, T: Element> Vector<S, T> {$(
+            $(#[$doc])*
+            #[inline(always)]
+            pub fn $method(self, $($other: Self),*) -> Self {
+                let register = <T as Element>::$method(self.simd, self.register, $($other.register),*);
+                Self::new(self.simd, register)
+            }
+        )*}
+    };
+}
+
+methods! {
+    abs();
+    sqrt();
+    /// 2^k for integers k if that is a normal number.
+    power_of_two();
+    /// self * factor + term
+    mul_add(factor, term);
+    /// The minimum; with a NaN the result depends on the processor.
+    min(other);
+    /// The maximum; with a NaN the result depends on the processor.
+    max(other);
+    /// The magnitude of `self` with the sign of `sign`.
+    with_sign_of(sign);
+}
+
+macro_rules! operators {
+    ($($operator:ident: $method:ident($($other:ident),*);)*) => {$(
         impl<S: Simd, T: Element> $operator for Vector<S, T> {
             type Output = Self;
 
             #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                let register = <T as Element>::$method(self.simd, self.register, other.register);
+            fn $method(self, $($other: Self),*) -> Self {
+                let register = <T as Element>::$method(self.simd, self.register, $($other.register),*);
                 Self::new(self.simd, register)
             }
         }
-    };
+    )*};
 }
 
-operator!(Add, add);
-operator!(Sub, sub);
-operator!(Mul, mul);
-operator!(Div, div);
-
-impl<S: Simd, T: Element> Neg for Vector<S, T> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self::new(self.simd, <T as Element>::neg(self.simd, self.register))
-    }
+operators! {
+    Add: add(other);
+    Sub: sub(other);
+    Mul: mul(other);
+    Div: div(other);
+    Neg: neg();
 }
 
 macro_rules! element {
     ($number:ty, $register:ident, $mask:ident, $lanes:ident, $read:ident, $write:ident, $sum:ident, $select:ident,
-     $splat:ident, $mul_add:ident, $less:ident, {$($unary:ident: $unary_of:ident),*}, {$($binary:ident: $of:ident),*},
-     $equal:ident, $first:ident, {$bits:ident, $to_bits:ident, $of_bits:ident, $splat_bits:ident, $same_bits:ident, $and:ident, $shift:ident},
+     $splat:ident, {$($method:ident($($operand:ident),*): $of:ident),*}, {$($comparison:ident: $comparison_of:ident),*}, $first:ident, {$bits:ident, $to_bits:ident, $of_bits:ident, $splat_bits:ident, $same_bits:ident, $and:ident, $shift:ident},
      {$and_not:ident, $and_number:ident, $or_number:ident}) => {
         impl Element for $number {
             type Register<S: Simd> = S::$register;
@@ -254,29 +237,14 @@ macro_rules! element {
             }
 
             $(#[inline(always)]
-            fn $unary<S: Simd>(simd: S, a: S::$register) -> S::$register {
-                simd.$unary_of(a)
+            fn $method<S: Simd>(simd: S, $($operand: S::$register),*) -> S::$register {
+                simd.$of($($operand),*)
             })*
 
             $(#[inline(always)]
-            fn $binary<S: Simd>(simd: S, a: S::$register, b: S::$register) -> S::$register {
-                simd.$of(a, b)
+            fn $comparison<S: Simd>(simd: S, a: S::$register, b: S::$register) -> S::$mask {
+                simd.$comparison_of(a, b)
             })*
-
-            #[inline(always)]
-            fn mul_add<S: Simd>(
-                simd: S,
-                a: S::$register,
-                b: S::$register,
-                c: S::$register,
-            ) -> S::$register {
-                simd.$mul_add(a, b, c)
-            }
-
-            #[inline(always)]
-            fn less<S: Simd>(simd: S, a: S::$register, b: S::$register) -> S::$mask {
-                simd.$less(a, b)
-            }
 
             #[inline(always)]
             fn select<S: Simd>(
@@ -291,11 +259,6 @@ macro_rules! element {
             #[inline(always)]
             fn sum<S: Simd>(simd: S, a: S::$register) -> Self {
                 simd.$sum(a)
-            }
-
-            #[inline(always)]
-            fn equal<S: Simd>(simd: S, a: S::$register, b: S::$register) -> S::$mask {
-                simd.$equal(a, b)
             }
 
             #[inline(always)]
@@ -341,12 +304,12 @@ macro_rules! element {
 }
 
 element!(f32, f32s, m32s, F32_LANES, as_simd_f32s, as_mut_simd_f32s, reduce_sum_f32s, select_f32s,
-    splat_f32s, mul_add_e_f32s, less_than_f32s, {neg: neg_f32s, abs: abs_f32s, sqrt: sqrt_f32s},
-    {add: add_f32s, sub: sub_f32s, mul: mul_f32s, div: div_f32s, min: min_f32s, max: max_f32s},
-    equal_f32s, first_true_m32s, {u32, transmute_u32s_f32s, transmute_f32s_u32s, splat_u32s, equal_u32s, and_u32s, mul_u32s},
+    splat_f32s, {neg(a): neg_f32s, abs(a): abs_f32s, sqrt(a): sqrt_f32s, add(a, b): add_f32s, sub(a, b): sub_f32s,
+    mul(a, b): mul_f32s, div(a, b): div_f32s, min(a, b): min_f32s, max(a, b): max_f32s, mul_add(a, b, c): mul_add_e_f32s},
+    {less: less_than_f32s, equal: equal_f32s}, first_true_m32s, {u32, transmute_u32s_f32s, transmute_f32s_u32s, splat_u32s, equal_u32s, and_u32s, mul_u32s},
     {not_f32s, and_f32s, or_f32s});
 element!(f64, f64s, m64s, F64_LANES, as_simd_f64s, as_mut_simd_f64s, reduce_sum_f64s, select_f64s,
-    splat_f64s, mul_add_e_f64s, less_than_f64s, {neg: neg_f64s, abs: abs_f64s, sqrt: sqrt_f64s},
-    {add: add_f64s, sub: sub_f64s, mul: mul_f64s, div: div_f64s, min: min_f64s, max: max_f64s},
-    equal_f64s, first_true_m64s, {u64, transmute_u64s_f64s, transmute_f64s_u64s, splat_u64s, equal_u64s, and_u64s, mul_u64s},
+    splat_f64s, {neg(a): neg_f64s, abs(a): abs_f64s, sqrt(a): sqrt_f64s, add(a, b): add_f64s, sub(a, b): sub_f64s,
+    mul(a, b): mul_f64s, div(a, b): div_f64s, min(a, b): min_f64s, max(a, b): max_f64s, mul_add(a, b, c): mul_add_e_f64s},
+    {less: less_than_f64s, equal: equal_f64s}, first_true_m64s, {u64, transmute_u64s_f64s, transmute_f64s_u64s, splat_u64s, equal_u64s, and_u64s, mul_u64s},
     {not_f64s, and_f64s, or_f64s});
