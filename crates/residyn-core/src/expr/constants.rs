@@ -1,9 +1,9 @@
 //! Parts of a formula that are not finite, whatever values its names have.
 
-use super::FormulaError;
-use super::op::{Binary, Function, Unary};
+use super::op::{Binary, Node};
 use super::parse::{Formula, Infix, Kind, Term};
-use super::scope::Fault;
+use super::scope::{Fault, infix_node};
+use super::{FormulaError, Graph, Scope, SignForm};
 
 impl Formula {
     /// Refuse such parts.
@@ -16,7 +16,7 @@ impl Formula {
 /// The value of a term; `None` if a name determines it.
 fn constant(term: &Term) -> Result<Option<f64>, Fault> {
     let fault = |message: String| Err((term.span.clone(), message));
-    let value = match &term.kind {
+    let constant_of = match &term.kind {
         Kind::Number(value) => Some(*value),
         Kind::Name(_) => None,
         Kind::Negate(a) => constant(a)?.map(|a| -a),
@@ -26,41 +26,27 @@ fn constant(term: &Term) -> Result<Option<f64>, Fault> {
             }
             (Infix::Plain(Binary::Mul | Binary::Div), Some(0.0), _)
             | (Infix::Plain(Binary::Mul), _, Some(0.0)) => Some(0.0),
-            (infix, a, b) => a.zip(b).map(|(a, b)| infix.apply(a, b)),
+            (infix, a, b) => a
+                .zip(b)
+                .map(|(a, b)| value(&[a, b], |graph, of| infix_node(graph, infix, of[0], of[1]))),
         },
         Kind::Call(function, arguments) => {
             let values = arguments.iter().map(constant);
             let values: Option<Vec<f64>> = values.collect::<Result<_, _>>()?;
-            values.map(|values| function.apply(&values))
+            let scope = Scope::new(SignForm::Exact);
+            values.map(|of| value(&of, |graph, of| scope.call(graph, *function, of)))
         }
     };
-    match value {
+    match constant_of {
         Some(value) if !value.is_finite() => fault(format!("this is {value}, not a finite number")),
-        _ => Ok(value),
+        _ => Ok(constant_of),
     }
 }
 
-impl Infix {
-    fn apply(self, a: f64, b: f64) -> f64 {
-        match self {
-            Self::Plain(op) => op.apply(a, b),
-            Self::Greater => Binary::Less.apply(b, a),
-            Self::AtMost => 1.0 - Binary::Less.apply(b, a),
-            Self::AtLeast => 1.0 - Binary::Less.apply(a, b),
-        }
-    }
-}
-
-impl Function {
-    fn apply(self, arguments: &[f64]) -> f64 {
-        match (self, arguments) {
-            (Self::Unary(op), [a]) => op.apply(*a),
-            (Self::Binary(op), [a, b]) => op.apply(*a, *b),
-            (Self::Clamp, [x, low, high]) => Binary::Min.apply(Binary::Max.apply(*x, *low), *high),
-            (Self::Where, [condition, then, _]) if *condition > 0.0 => *then,
-            (Self::Where, [_, _, otherwise]) => *otherwise,
-            (Self::Sign, [x]) => Unary::Sign.apply(*x),
-            _ => unreachable!("the parser counts arguments"),
-        }
-    }
+/// The value of an operation on numbers.
+fn value(of: &[f64], operation: impl FnOnce(&mut Graph, &[Node]) -> Node) -> f64 {
+    let mut graph = Graph::new();
+    let operands: Vec<Node> = of.iter().map(|number| graph.constant(*number)).collect();
+    let result = operation(&mut graph, &operands);
+    graph.finish(&[result]).eval(&[])[0]
 }

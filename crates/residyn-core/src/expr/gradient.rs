@@ -18,14 +18,9 @@ impl Graph {
             }
         }
         let zero = self.constant(0.0);
+        let adjoint = |node: &Node| adjoints.get(node.index()).copied().flatten();
         wrt.iter()
-            .map(|node| {
-                adjoints
-                    .get(node.index())
-                    .copied()
-                    .flatten()
-                    .unwrap_or(zero)
-            })
+            .map(|node| adjoint(node).unwrap_or(zero))
             .collect()
     }
 
@@ -50,26 +45,17 @@ impl Graph {
 
     /// Pass the adjoint of `node` on to its operands.
     fn spread(&mut self, adjoints: &mut [Option<Node>], node: Node, adjoint: Node) {
-        match self.ops[node.index()] {
-            Op::Const(_) | Op::Input(_) => {}
-            Op::Unary(op, a) => {
-                if let Some(slope) = self.unary_slope(op, a, node) {
-                    let part = self.mul(adjoint, slope);
-                    self.accumulate(adjoints, a, part);
-                }
-            }
-            Op::Binary(op, a, b) => {
-                for (operand, part) in self.binary_parts(op, a, b, node, adjoint) {
-                    self.accumulate(adjoints, operand, part);
-                }
-            }
-            Op::Where(condition, a, b) => {
-                let zero = self.constant(0.0);
-                let to_a = self.select(condition, adjoint, zero);
-                let to_b = self.select(condition, zero, adjoint);
-                self.accumulate(adjoints, a, to_a);
-                self.accumulate(adjoints, b, to_b);
-            }
+        let parts = match self.ops[node.index()] {
+            Op::Const(_) | Op::Input(_) => Vec::new(),
+            Op::Unary(op, a) => match self.unary_slope(op, a, node) {
+                Some(slope) => vec![(a, self.mul(adjoint, slope))],
+                None => Vec::new(),
+            },
+            Op::Binary(op, a, b) => self.binary_parts(op, a, b, node, adjoint),
+            Op::Where(condition, a, b) => self.choice_parts(condition, a, b, adjoint),
+        };
+        for (operand, part) in parts {
+            self.accumulate(adjoints, operand, part);
         }
     }
 
@@ -127,8 +113,14 @@ impl Graph {
                 let to_x = self.mul(scaled, a);
                 vec![(a, self.mul(scaled, b)), (b, self.neg(to_x))]
             }
-            Binary::Min => self.choice_parts(a, b, a, b, adjoint),
-            Binary::Max => self.choice_parts(b, a, a, b, adjoint),
+            Binary::Min => {
+                let first = self.binary(Binary::Less, a, b);
+                self.choice_parts(first, a, b, adjoint)
+            }
+            Binary::Max => {
+                let first = self.binary(Binary::Less, b, a);
+                self.choice_parts(first, a, b, adjoint)
+            }
             Binary::Less => Vec::new(),
         }
     }
@@ -159,20 +151,10 @@ impl Graph {
         self.select(is_zero, zero, value)
     }
 
-    /// The adjoint goes to `a` where `low < high`, else to `b`.
-    fn choice_parts(
-        &mut self,
-        low: Node,
-        high: Node,
-        a: Node,
-        b: Node,
-        adjoint: Node,
-    ) -> Vec<(Node, Node)> {
+    /// The adjoint goes to `a` where the condition is positive, else to `b`.
+    fn choice_parts(&mut self, first: Node, a: Node, b: Node, adjoint: Node) -> Vec<(Node, Node)> {
         let zero = self.constant(0.0);
-        let first = self.binary(Binary::Less, low, high);
-        vec![
-            (a, self.select(first, adjoint, zero)),
-            (b, self.select(first, zero, adjoint)),
-        ]
+        let to_a = self.select(first, adjoint, zero);
+        vec![(a, to_a), (b, self.select(first, zero, adjoint))]
     }
 }

@@ -85,17 +85,12 @@ impl Notation for Latex {
     }
 
     fn quotient(&self, a: Part, b: Part) -> Part {
-        Part {
-            text: format!("\\frac{{{}}}{{{}}}", a.text, b.text),
-            precedence: PRODUCT,
-        }
+        Part::of(PRODUCT, format!("\\frac{{{}}}{{{}}}", a.text, b.text))
     }
 
     fn power(&self, a: Part, b: Part) -> Part {
-        Part {
-            text: format!("{{{}}}^{{{}}}", a.binding(self, POWER + 1), b.text),
-            precedence: POWER,
-        }
+        let a = a.binding(self, POWER + 1);
+        Part::of(POWER, format!("{{{a}}}^{{{}}}", b.text))
     }
 
     fn absolute(&self, a: &str) -> String {
@@ -107,13 +102,7 @@ impl Notation for Latex {
     }
 
     fn choice(&self, condition: &Part, a: &str, b: &str) -> String {
-        // Only a comparison reads as a condition by itself.
-        let sign = if condition.is_comparison() {
-            ""
-        } else {
-            " > 0"
-        };
-        let condition = format!("{}{sign}", condition.text);
+        let condition = condition.condition();
         format!("\\begin{{cases}} {a} & {condition} \\\\ {b} & \\text{{otherwise}} \\end{{cases}}")
     }
 }

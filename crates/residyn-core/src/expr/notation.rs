@@ -8,8 +8,6 @@ pub trait Notation {
     fn number(&self, value: f64) -> String;
     /// An input, an output or an intermediate.
     fn name(&self, name: &str) -> String;
-    /// `a` to the power of `b`; squares and cubes come with a whole number for `b`.
-    fn power(&self, a: Part, b: Part) -> Part;
     /// `a` where `condition` is positive, else `b`.
     fn choice(&self, condition: &Part, a: &str, b: &str) -> String;
 
@@ -26,11 +24,21 @@ pub trait Notation {
     }
 
     fn quotient(&self, a: Part, b: Part) -> Part {
-        let (a, b) = (a.binding(self, PRODUCT), b.binding(self, PRODUCT + 1));
-        Part {
-            text: a + " / " + &b,
-            precedence: PRODUCT,
-        }
+        infix(self, a, "/", b, PRODUCT)
+    }
+
+    /// `a` to the power of `b`; squares and cubes come with a whole number for `b`. As products they are exact where
+    /// powers are rounded, and faster.
+    fn power(&self, a: Part, b: Part) -> Part {
+        let times = match b.text.as_str() {
+            "2" => 2,
+            "3" => 3,
+            _ => return atom(self.call("pow", &[a.text, b.text])),
+        };
+        Part::of(
+            PRODUCT,
+            vec![a.binding(self, PRODUCT + 1); times].join(" * "),
+        )
     }
 
     fn absolute(&self, a: &str) -> String {
@@ -57,27 +65,18 @@ pub(super) const POWER: u8 = 9;
 pub(super) const ATOM: u8 = 11;
 
 impl Part {
-    /// Whether it is a comparison.
-    pub fn is_comparison(&self) -> bool {
-        self.precedence == COMPARE
+    pub(super) fn of(precedence: u8, text: String) -> Self {
+        Self { text, precedence }
     }
 
-    /// A product of factors that are already printed.
-    pub fn product(text: String) -> Self {
-        Self {
-            text,
-            precedence: PRODUCT,
-        }
-    }
-
-    /// A call or another expression that needs no parentheses.
-    pub fn call(text: String) -> Self {
-        atom(text)
-    }
-
-    /// The text as a factor of a product, in parentheses if it needs them.
-    pub fn factor<N: Notation + ?Sized>(self, notation: &N) -> String {
-        self.binding(notation, PRODUCT + 1)
+    /// The text as a condition: only a comparison reads as one by itself.
+    pub fn condition(&self) -> String {
+        let sign = if self.precedence == COMPARE {
+            ""
+        } else {
+            " > 0"
+        };
+        format!("{}{sign}", self.text)
     }
 
     /// The text, in parentheses if it binds weaker than `least`.
@@ -91,10 +90,20 @@ impl Part {
 }
 
 pub(super) fn atom(text: String) -> Part {
-    Part {
-        text,
-        precedence: ATOM,
-    }
+    Part::of(ATOM, text)
+}
+
+/// An operation whose operators of one precedence are read from the left.
+pub(super) fn infix<N: Notation + ?Sized>(
+    notation: &N,
+    a: Part,
+    sign: &str,
+    b: Part,
+    precedence: u8,
+) -> Part {
+    let b = b.binding(notation, precedence + 1);
+    let a = a.binding(notation, precedence);
+    Part::of(precedence, a + " " + sign + " " + &b)
 }
 
 /// The language of model files.
@@ -110,10 +119,8 @@ impl Notation for Text {
     }
 
     fn power(&self, a: Part, b: Part) -> Part {
-        Part {
-            text: format!("{}^{}", a.binding(self, POWER + 1), b.binding(self, POWER)),
-            precedence: POWER,
-        }
+        let (a, b) = (a.binding(self, POWER + 1), b.binding(self, POWER));
+        Part::of(POWER, a + "^" + &b)
     }
 
     fn choice(&self, condition: &Part, a: &str, b: &str) -> String {

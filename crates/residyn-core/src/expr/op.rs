@@ -93,6 +93,12 @@ impl Function {
         FUNCTIONS.iter().find(|(n, _)| *n == name).map(|(_, f)| *f)
     }
 
+    /// As formulas call it.
+    pub(super) fn name(self) -> &'static str {
+        let own = FUNCTIONS.iter().find(|(_, function)| *function == self);
+        own.map_or("", |(name, _)| name)
+    }
+
     /// Names of its arguments, for error messages.
     pub(super) fn arguments(self) -> &'static [&'static str] {
         match self {

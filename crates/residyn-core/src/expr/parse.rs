@@ -1,6 +1,7 @@
 use std::ops::Range;
 
 use super::FormulaError;
+use super::notation::{COMPARE, POWER, PRODUCT, SIGN, SUM};
 use super::op::{Binary, FUNCTIONS, Function};
 use crate::limits::{FORMULA_CHAIN, FORMULA_NESTING};
 
@@ -57,38 +58,29 @@ impl Formula {
     /// Every name that the formula mentions, in order, with repetitions.
     pub fn names(&self) -> Vec<&str> {
         let mut names = Vec::new();
-        self.root.visit(&mut |term| {
-            if let Kind::Name(name) = &term.kind {
-                names.push(name.as_str());
-            }
-        });
+        self.root.add_names(&mut names);
         names
     }
 }
 
 impl Kind {
-    /// Height of the tallest operand; 0 without one.
-    fn height(&self) -> usize {
+    fn operands(&self) -> Vec<&Term> {
         match self {
-            Self::Number(_) | Self::Name(_) => 0,
-            Self::Negate(a) => a.height,
-            Self::Infix(_, a, b) => a.height.max(b.height),
-            Self::Call(_, arguments) => arguments.iter().map(|a| a.height).max().unwrap_or(0),
+            Self::Number(_) | Self::Name(_) => Vec::new(),
+            Self::Negate(a) => vec![a],
+            Self::Infix(_, a, b) => vec![a, b],
+            Self::Call(_, arguments) => arguments.iter().collect(),
         }
     }
 }
 
 impl Term {
-    fn visit<'a>(&'a self, f: &mut impl FnMut(&'a Term)) {
-        f(self);
-        match &self.kind {
-            Kind::Number(_) | Kind::Name(_) => {}
-            Kind::Negate(a) => a.visit(f),
-            Kind::Infix(_, a, b) => {
-                a.visit(f);
-                b.visit(f);
-            }
-            Kind::Call(_, arguments) => arguments.iter().for_each(|a| a.visit(f)),
+    fn add_names<'t>(&'t self, names: &mut Vec<&'t str>) {
+        if let Kind::Name(name) = &self.kind {
+            names.push(name);
+        }
+        for operand in self.kind.operands() {
+            operand.add_names(names);
         }
     }
 }
@@ -137,49 +129,48 @@ struct Parser<'a> {
     terms: usize,
 }
 
-/// Infix operators, longest spelling first: (spelling, operator, binding power to the left, to the right).
-const INFIX: &[(&str, Infix, u8, u8)] = &[
-    ("<=", Infix::AtMost, 1, 2),
-    (">=", Infix::AtLeast, 1, 2),
-    ("<", Infix::Plain(Binary::Less), 1, 2),
-    (">", Infix::Greater, 1, 2),
-    ("+", Infix::Plain(Binary::Add), 3, 4),
-    ("-", Infix::Plain(Binary::Sub), 3, 4),
-    ("*", Infix::Plain(Binary::Mul), 5, 6),
-    ("/", Infix::Plain(Binary::Div), 5, 6),
-    ("^", Infix::Plain(Binary::Pow), 10, 9),
+/// Infix operators with their precedence, longest spelling first.
+const INFIX: &[(&str, Infix, u8)] = &[
+    ("<=", Infix::AtMost, COMPARE),
+    (">=", Infix::AtLeast, COMPARE),
+    ("<", Infix::Plain(Binary::Less), COMPARE),
+    (">", Infix::Greater, COMPARE),
+    ("+", Infix::Plain(Binary::Add), SUM),
+    ("-", Infix::Plain(Binary::Sub), SUM),
+    ("*", Infix::Plain(Binary::Mul), PRODUCT),
+    ("/", Infix::Plain(Binary::Div), PRODUCT),
+    ("^", Infix::Plain(Binary::Pow), POWER),
 ];
-const PREFIX_POWER: u8 = 7;
 
 /// What to do about a formula that is too deep.
 const REMEDY: &str = "name parts of it under [dynamics.let]";
 
 impl<'a> Parser<'a> {
-    /// Reads everything that binds at least as strongly as `power`.
-    fn infix(&mut self, power: u8) -> Result<Term, FormulaError> {
+    /// Reads everything that binds at least as strongly as `least`.
+    fn infix(&mut self, least: u8) -> Result<Term, FormulaError> {
         if self.depth == FORMULA_NESTING {
             return Err(self.error_here(format!(
                 "is nested in more than {FORMULA_NESTING} parentheses, calls, signs or powers; {REMEDY}"
             )));
         }
         self.depth += 1;
-        let term = self.climb(power);
+        let term = self.climb(least);
         self.depth -= 1;
         term
     }
 
-    /// Precedence climbing.
-    fn climb(&mut self, power: u8) -> Result<Term, FormulaError> {
+    /// Precedence climbing. Operators of one precedence are read from the left, except powers.
+    fn climb(&mut self, least: u8) -> Result<Term, FormulaError> {
         let mut left = self.prefix()?;
-        while let Some(&(spelling, infix, to_left, to_right)) = self.peek_infix() {
-            if to_left < power {
+        while let Some(&(spelling, infix, precedence)) = self.peek_infix() {
+            if precedence < least {
                 break;
             }
             if self.rest().starts_with("**") {
                 return Err(self.error_here("powers are written `^`".into()));
             }
             self.at += spelling.len();
-            let right = self.infix(to_right)?;
+            let right = self.infix(precedence + u8::from(precedence != POWER))?;
             let span = left.span.start..right.span.end;
             left = self.term(Kind::Infix(infix, Box::new(left), Box::new(right)), span)?;
         }
@@ -190,12 +181,12 @@ impl<'a> Parser<'a> {
         self.skip_space();
         let start = self.at;
         if self.eat('-') {
-            let inner = self.infix(PREFIX_POWER)?;
+            let inner = self.infix(SIGN)?;
             let span = start..inner.span.end;
             return self.term(Kind::Negate(Box::new(inner)), span);
         }
         if self.eat('+') {
-            return self.infix(PREFIX_POWER);
+            return self.infix(SIGN);
         }
         self.atom()
     }
@@ -307,7 +298,8 @@ impl<'a> Parser<'a> {
     /// A term that was read.
     fn term(&mut self, kind: Kind, span: Range<usize>) -> Result<Term, FormulaError> {
         self.terms += 1;
-        let height = kind.height() + 1;
+        let of_operands = kind.operands().into_iter().map(|operand| operand.height);
+        let height = of_operands.max().unwrap_or(0) + 1;
         if height > FORMULA_CHAIN {
             let message = format!("more than {FORMULA_CHAIN} operations in a row; {REMEDY}");
             return Err(self.error_at(span, message));
@@ -315,7 +307,7 @@ impl<'a> Parser<'a> {
         Ok(Term { kind, span, height })
     }
 
-    fn peek_infix(&mut self) -> Option<&'static (&'static str, Infix, u8, u8)> {
+    fn peek_infix(&mut self) -> Option<&'static (&'static str, Infix, u8)> {
         self.skip_space();
         INFIX.iter().find(|entry| self.rest().starts_with(entry.0))
     }

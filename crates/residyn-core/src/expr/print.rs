@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use super::Program;
 use super::latex::Latex;
-use super::notation::{COMPARE, Notation, PRODUCT, Part, SIGN, SUM, Text, atom};
-use super::op::{Binary, Node, Op, Unary};
+use super::notation::{COMPARE, Notation, PRODUCT, Part, SIGN, SUM, Text, atom, infix};
+use super::op::{Binary, Function, Node, Op, Unary};
 
 /// Inputs and constants in a formula that is written out wherever it is used. Without a limit, the equations of a long chain
 /// would double with each of its joints.
@@ -130,10 +130,7 @@ impl Program {
     fn part(&self, notation: &dyn Notation, op: Op, parts: &mut Parts) -> Part {
         let mut at = |node: Node| parts.take(node);
         match op {
-            Op::Const(value) if value.is_sign_negative() => Part {
-                text: notation.number(value),
-                precedence: SIGN,
-            },
+            Op::Const(value) if value.is_sign_negative() => Part::of(SIGN, notation.number(value)),
             Op::Const(value) => atom(notation.number(value)),
             Op::Input(k) => atom(notation.name(&self.inputs[k as usize])),
             Op::Unary(op, a) => unary(notation, op, at(a)),
@@ -177,51 +174,29 @@ impl Parts {
 }
 
 fn unary(notation: &dyn Notation, op: Unary, a: Part) -> Part {
-    let name = match op {
-        Unary::Neg => {
-            return Part {
-                text: format!("-{}", a.binding(notation, PRODUCT + 1)),
-                precedence: SIGN,
-            };
-        }
-        Unary::Abs => return atom(notation.absolute(&a.text)),
-        Unary::Sqrt => return atom(notation.root(&a.text)),
-        Unary::Sin => "sin",
-        Unary::Cos => "cos",
-        Unary::Tan => "tan",
-        Unary::Exp => "exp",
-        Unary::Log => "log",
-        Unary::Sign => "sign",
-        Unary::Tanh => "tanh",
-    };
-    atom(notation.call(name, &[a.text]))
+    match op {
+        Unary::Neg => Part::of(SIGN, "-".to_owned() + &a.binding(notation, PRODUCT + 1)),
+        Unary::Abs => atom(notation.absolute(&a.text)),
+        Unary::Sqrt => atom(notation.root(&a.text)),
+        Unary::Sign => atom(notation.call(Function::Sign.name(), &[a.text])),
+        _ => atom(notation.call(Function::Unary(op).name(), &[a.text])),
+    }
 }
 
 fn binary(notation: &dyn Notation, op: Binary, a: Part, b: Part) -> Part {
-    let infix = |sign: &str, precedence: u8, a: Part, b: Part| Part {
-        text: a.binding(notation, precedence)
-            + " "
-            + sign
-            + " "
-            + &b.binding(notation, precedence + 1),
-        precedence,
-    };
     match op {
-        Binary::Add => infix("+", SUM, a, b),
-        Binary::Sub => infix("-", SUM, a, b),
-        Binary::Less => infix("<", COMPARE, a, b),
-        Binary::Mul => Part {
-            text: notation.product(
-                a.binding(notation, PRODUCT),
-                &b.binding(notation, PRODUCT + 1),
-            ),
-            precedence: PRODUCT,
-        },
+        Binary::Add => infix(notation, a, "+", b, SUM),
+        Binary::Sub => infix(notation, a, "-", b, SUM),
+        Binary::Less => infix(notation, a, "<", b, COMPARE),
+        Binary::Mul => {
+            let b = b.binding(notation, PRODUCT + 1);
+            Part::of(PRODUCT, notation.product(a.binding(notation, PRODUCT), &b))
+        }
         Binary::Div => notation.quotient(a, b),
         Binary::Pow => notation.power(a, b),
-        Binary::Atan2 => atom(notation.call("atan2", &[a.text, b.text])),
-        Binary::Min => atom(notation.call("min", &[a.text, b.text])),
-        Binary::Max => atom(notation.call("max", &[a.text, b.text])),
+        Binary::Atan2 | Binary::Min | Binary::Max => {
+            atom(notation.call(Function::Binary(op).name(), &[a.text, b.text]))
+        }
     }
 }
 

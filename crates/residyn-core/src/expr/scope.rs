@@ -121,7 +121,7 @@ impl Scope {
         }
     }
 
-    fn call(&self, graph: &mut Graph, function: Function, arguments: &[Node]) -> Node {
+    pub(super) fn call(&self, graph: &mut Graph, function: Function, arguments: &[Node]) -> Node {
         match (function, arguments) {
             (Function::Unary(op), [a]) => graph.unary(op, *a),
             (Function::Binary(op), [a, b]) => graph.binary(op, *a, *b),
@@ -146,21 +146,15 @@ impl Scope {
     }
 }
 
-fn infix_node(graph: &mut Graph, infix: Infix, a: Node, b: Node) -> Node {
-    let not = |graph: &mut Graph, node| {
-        let one = graph.constant(1.0);
-        graph.sub(one, node)
-    };
+pub(super) fn infix_node(graph: &mut Graph, infix: Infix, a: Node, b: Node) -> Node {
     match infix {
         Infix::Plain(op) => graph.binary(op, a, b),
         Infix::Greater => graph.binary(Binary::Less, b, a),
         Infix::AtMost => {
-            let above = graph.binary(Binary::Less, b, a);
-            not(graph, above)
+            let above = infix_node(graph, Infix::Greater, a, b);
+            let one = graph.constant(1.0);
+            graph.sub(one, above)
         }
-        Infix::AtLeast => {
-            let below = graph.binary(Binary::Less, a, b);
-            not(graph, below)
-        }
+        Infix::AtLeast => infix_node(graph, Infix::AtMost, b, a),
     }
 }

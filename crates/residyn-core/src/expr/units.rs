@@ -42,13 +42,14 @@ impl Reader<'_> {
 
     fn infix(&mut self, infix: Infix, whole: &Term, [a, b]: [&Term; 2]) -> Option<Unit> {
         match infix {
-            Infix::Plain(Binary::Mul) => {
+            Infix::Plain(op @ (Binary::Mul | Binary::Div)) => {
                 let (a, b) = (self.term(a), self.term(b));
-                Some(a?.times(b?))
-            }
-            Infix::Plain(Binary::Div) => {
-                let (a, b) = (self.term(a), self.term(b));
-                Some(a?.over(b?))
+                let combined = if op == Binary::Mul {
+                    Unit::times
+                } else {
+                    Unit::over
+                };
+                Some(combined(a?, b?))
             }
             Infix::Plain(Binary::Pow) => self.power(whole, a, b),
             Infix::Plain(Binary::Add | Binary::Sub) => self.alike([a, b]),

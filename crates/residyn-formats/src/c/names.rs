@@ -86,24 +86,8 @@ impl Notation for Names {
         }
     }
 
-    fn power(&self, a: Part, b: Part) -> Part {
-        match b.text.as_str() {
-            "2" | "3" => {
-                let factor = a.factor(self);
-                let times = if b.text == "2" { 2 } else { 3 };
-                Part::product(vec![factor; times].join(" * "))
-            }
-            _ => Part::call(self.call("pow", &[a.text, b.text])),
-        }
-    }
-
     fn choice(&self, condition: &Part, a: &str, b: &str) -> String {
-        let positive = if condition.is_comparison() {
-            ""
-        } else {
-            " > 0"
-        };
-        format!("({}{positive} ? {a} : {b})", condition.text)
+        format!("({} ? {a} : {b})", condition.condition())
     }
 
     fn call(&self, function: &str, arguments: &[String]) -> String {

@@ -43,26 +43,13 @@ impl Notation for Python {
             "atan2" => "arctan2",
             "min" => "minimum",
             "max" => "maximum",
+            "pow" => "power",
             same => same,
         };
         format!("np.{function}({})", arguments.join(", "))
     }
 
-    fn power(&self, a: Part, b: Part) -> Part {
-        // Products are exact where powers are rounded, and faster.
-        match b.text.as_str() {
-            "2" => Part::product(format!("{0} * {0}", a.factor(self))),
-            "3" => Part::product(format!("{0} * {0} * {0}", a.factor(self))),
-            _ => Part::call(format!("np.power({}, {})", a.text, b.text)),
-        }
-    }
-
     fn choice(&self, condition: &Part, a: &str, b: &str) -> String {
-        let sign = if condition.is_comparison() {
-            ""
-        } else {
-            " > 0"
-        };
-        format!("np.where({}{sign}, {a}, {b})", condition.text)
+        format!("np.where({}, {a}, {b})", condition.condition())
     }
 }
