@@ -63,10 +63,8 @@ fn chain(joints: usize) -> Model {
 /// Nanoseconds per state; inputs from `held` on are parameters with these values.
 fn nanoseconds<T: Element, const W: usize>(program: &Program, held: usize, values: &[f64]) -> f64 {
     let number = |x: f64| T::from_f64(x).expect("a number");
-    let mut tape = program.tape_with_held::<T, W>(held);
-    for (slot, value) in tape.inputs()[held..].iter_mut().zip(values) {
-        *slot = Row::splat(number(*value));
-    }
+    let values: Vec<T> = values.iter().map(|value| number(*value)).collect();
+    let mut tape = program.tape_at::<T, W>(held, &values);
     let rounds = STATES / W;
     let mut best = f64::INFINITY;
     for _ in 0..REPEATS {

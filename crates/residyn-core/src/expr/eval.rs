@@ -1,5 +1,3 @@
-use std::marker::PhantomData;
-
 use super::Program;
 use super::op::{Binary, Op, Unary};
 use super::places::Places;
@@ -12,9 +10,8 @@ mod tests;
 /// Working memory for `W` independent evaluations of one program, vectorised if `W` is a multiple of the processor's
 /// vector length.
 #[derive(Debug, Clone)]
-pub struct Tape<'p, T, const W: usize> {
+pub struct Tape<T, const W: usize> {
     inputs: usize,
-    program: PhantomData<&'p Program>,
     /// Steps that depend only on held inputs.
     held: Runs,
     /// All other steps.
@@ -28,43 +25,30 @@ pub struct Tape<'p, T, const W: usize> {
     outputs: Vec<u32>,
 }
 
-/// Consecutive steps of one kind.
-#[derive(Debug, Clone, Copy)]
-struct Run {
-    kind: Kind,
-    count: usize,
-}
-
-/// Steps, divided into runs.
+/// Steps, and how many consecutive ones are of one kind.
 #[derive(Debug, Clone)]
 struct Runs {
     steps: Vec<Step>,
-    runs: Vec<Run>,
+    runs: Vec<(Kind, usize)>,
 }
 
 impl Runs {
     fn new(steps: Vec<Step>) -> Self {
         let of_one_kind = steps.chunk_by(|a, b| a.kind == b.kind);
-        let run = |steps: &[Step]| Run {
-            kind: steps[0].kind,
-            count: steps.len(),
-        };
-        Self {
-            runs: of_one_kind.map(run).collect(),
-            steps,
-        }
+        let runs = of_one_kind.map(|run| (run[0].kind, run.len())).collect();
+        Self { steps, runs }
     }
 }
 
 impl Program {
     /// Working memory for this program with the constants in place and all inputs zero.
-    pub fn tape<T: Element, const W: usize>(&self) -> Tape<'_, T, W> {
+    pub fn tape<T: Element, const W: usize>(&self) -> Tape<T, W> {
         self.tape_with_held(self.inputs.len())
     }
 
     /// As [`Program::tape`] when the inputs from `held_from` on change rarely: steps that depend only on them are
     /// evaluated again only after a call of [`Tape::inputs`]; [`Tape::moving`] gives access to the other inputs.
-    pub fn tape_with_held<T: Element, const W: usize>(&self, held_from: usize) -> Tape<'_, T, W> {
+    pub fn tape_with_held<T: Element, const W: usize>(&self, held_from: usize) -> Tape<T, W> {
         let is_held = |step: &&Step| step.first_input as usize >= held_from;
         let (mut held, mut moving): (Vec<Step>, Vec<Step>) =
             self.steps.steps.iter().partition(is_held);
@@ -72,36 +56,41 @@ impl Program {
             Op::Const(value) => Some(*value),
             _ => None,
         });
-        let constants: Vec<Option<f64>> = of_ops.chain(self.steps.more.iter().copied()).collect();
-        let mut places = Places::new(constants.len(), self.inputs.len());
-        let constants = || {
-            (0..)
-                .zip(&constants)
-                .filter_map(|(k, value)| Some((k, (*value)?)))
-        };
-        constants().for_each(|(value, _)| places.keep(value));
-        self.outputs
-            .iter()
-            .for_each(|output| places.keep(output.index()));
+        let all = of_ops.chain(self.steps.more.iter().copied()).enumerate();
+        let constants: Vec<(usize, f64)> = all.filter_map(|(k, value)| Some((k, value?))).collect();
+        let count = self.ops.len() + self.steps.more.len();
+        let mut places = Places::new(count, self.inputs.len());
+        let kept = constants.iter().map(|(value, _)| *value);
+        let kept = kept.chain(self.outputs.iter().map(|output| output.index()));
+        kept.for_each(|value| places.keep(value));
         places.settle(&mut held);
         places.pass(&mut moving);
         let place = |value: usize| places.of[value] as usize;
         let mut values = vec![Row::splat(T::zero()); places.count as usize];
-        for (value, number) in constants() {
+        for (value, number) in constants {
             values[place(value)] =
                 Row::splat(T::from_f64(number).expect("every f64 has a nearest float"));
         }
         let outputs = self.outputs.iter();
+        let outputs = outputs.map(|output| places.of[output.index()]).collect();
         Tape {
             inputs: self.inputs.len(),
-            program: PhantomData,
             held: Runs::new(held),
             moving: Runs::new(moving),
             held_from,
             settled: false,
             values,
-            outputs: outputs.map(|output| places.of[output.index()]).collect(),
+            outputs,
         }
+    }
+
+    /// As [`Program::tape_with_held`], with these values of the held inputs in every lane.
+    pub fn tape_at<T: Element, const W: usize>(&self, held_from: usize, held: &[T]) -> Tape<T, W> {
+        let mut tape = self.tape_with_held(held_from);
+        for (slot, value) in tape.inputs()[held_from..].iter_mut().zip(held) {
+            *slot = Row::splat(*value);
+        }
+        tape
     }
 
     /// Evaluate once in f64. For repeated evaluation keep a [`Tape`].
@@ -110,30 +99,13 @@ impl Program {
     /// When `inputs` is not as long as [`Program::inputs`].
     pub fn eval(&self, inputs: &[f64]) -> Vec<f64> {
         assert_eq!(inputs.len(), self.inputs.len(), "one value for each input");
-        let mut tape = self.tape::<f64, 1>();
-        for (slot, value) in tape.inputs().iter_mut().zip(inputs) {
-            *slot = Row([*value]);
-        }
+        let mut tape = self.tape_at::<f64, 1>(0, inputs);
         tape.run();
         (0..self.outputs.len()).map(|k| tape.output(k)[0]).collect()
     }
 }
 
-impl<T: Element, const W: usize> Tape<'_, T, W> {
-    /// The same memory without the borrow of its program.
-    pub fn into_owned(self) -> Tape<'static, T, W> {
-        Tape {
-            inputs: self.inputs,
-            program: PhantomData,
-            held: self.held,
-            moving: self.moving,
-            held_from: self.held_from,
-            settled: self.settled,
-            values: self.values,
-            outputs: self.outputs,
-        }
-    }
-
+impl<T: Element, const W: usize> Tape<T, W> {
     /// The inputs, to be set before [`Tape::run`]: `[input][lane]`.
     #[inline(always)]
     pub fn inputs(&mut self) -> &mut [Row<T, W>] {
@@ -177,9 +149,9 @@ impl<T: Element, const W: usize> Tape<'_, T, W> {
         let first = usize::from(self.settled);
         for part in &[&self.held, &self.moving][first..] {
             let mut left = part.steps.as_slice();
-            for run in &part.runs {
-                let (steps, rest) = left.split_at(run.count);
-                values.carry_out(run.kind, steps);
+            for (kind, count) in &part.runs {
+                let (steps, rest) = left.split_at(*count);
+                values.carry_out(*kind, steps);
                 left = rest;
             }
         }
@@ -187,9 +159,9 @@ impl<T: Element, const W: usize> Tape<'_, T, W> {
     }
 }
 
-struct CarryOut<'t, 'p, T, const W: usize>(&'t mut Tape<'p, T, W>);
+struct CarryOut<'t, T, const W: usize>(&'t mut Tape<T, W>);
 
-impl<T: Element, const W: usize> WithSimd for CarryOut<'_, '_, T, W> {
+impl<T: Element, const W: usize> WithSimd for CarryOut<'_, T, W> {
     type Output = ();
 
     #[inline(always)]
@@ -205,27 +177,10 @@ struct Values<'v, S, T, const W: usize> {
 
 // A macro, not closures: a closure may become a function of its own, compiled without the vector instructions.
 macro_rules! each {
-    ($values:ident, $steps:ident, |$a:ident| $value:expr) => {
+    ($values:ident, $steps:ident, |$($operand:ident),*| $value:expr) => {
         for &step in $steps {
             for part in 0..Row::<T, W>::parts::<S>() {
-                let $a = $values.get(step.a, part);
-                $values.set(step.to, part, $value);
-            }
-        }
-    };
-    ($values:ident, $steps:ident, |$a:ident, $b:ident| $value:expr) => {
-        for &step in $steps {
-            for part in 0..Row::<T, W>::parts::<S>() {
-                let ($a, $b) = ($values.get(step.a, part), $values.get(step.b, part));
-                $values.set(step.to, part, $value);
-            }
-        }
-    };
-    ($values:ident, $steps:ident, |$a:ident, $b:ident, $c:ident| $value:expr) => {
-        for &step in $steps {
-            for part in 0..Row::<T, W>::parts::<S>() {
-                let ($a, $b) = ($values.get(step.a, part), $values.get(step.b, part));
-                let $c = $values.get(step.c, part);
+                $(let $operand = $values.get(step.$operand, part);)*
                 $values.set(step.to, part, $value);
             }
         }

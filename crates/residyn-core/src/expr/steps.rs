@@ -96,11 +96,9 @@ impl<'o> Writer<'o> {
             });
             match op {
                 Op::Binary(Binary::Div, _, by) => divides[by.index()] += 1,
-                Op::Unary(Unary::Sin, angle) => {
-                    waves.entry(angle.0).or_insert([None; 2])[0] = Some(place)
-                }
-                Op::Unary(Unary::Cos, angle) => {
-                    waves.entry(angle.0).or_insert([None; 2])[1] = Some(place)
+                Op::Unary(op @ (Unary::Sin | Unary::Cos), angle) => {
+                    let waves = waves.entry(angle.0).or_insert([None; 2]);
+                    waves[usize::from(*op == Unary::Cos)] = Some(place);
                 }
                 _ => {}
             }

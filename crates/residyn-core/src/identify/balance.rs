@@ -5,7 +5,7 @@ use super::sensitivity::{LANES, Lane, Tangent};
 use super::sums::{Sums, loss};
 use super::values::Values;
 use crate::data::{Joint, Log, Smooth, Smoothing, row_from};
-use crate::expr::Tape;
+use crate::expr::{Program, Tape};
 use crate::lanes::Row;
 use crate::model::{Dynamics, InputLayout};
 use crate::sim::{Commands, Delivered, Point, Window};
@@ -121,20 +121,15 @@ impl Balance {
 
     /// Evaluate a program at each row, calling `see(lanes, tape)`, where `lanes` gives each lane's row, if it has one.
     /// A program may take the slopes of the torques with respect to filter parameters before its parameters.
-    fn over_rows<'t>(
+    fn over_rows(
         &self,
-        mut tape: Tape<'t, f64, LANES>,
+        program: &Program,
         first_parameter: usize,
         values: &Values,
         (rows, acting): (&[Rows], &Acting),
-        mut see: impl FnMut(&[Option<usize>; LANES], &Tape<'t, f64, LANES>),
+        mut see: impl FnMut(&[Option<usize>; LANES], &Tape<f64, LANES>),
     ) {
-        for (slot, value) in tape.inputs()[first_parameter..]
-            .iter_mut()
-            .zip(&values.common)
-        {
-            *slot = Row::splat(*value);
-        }
+        let mut tape = program.tape_at(first_parameter, &values.common);
         for own in &values.own {
             for lane in (0..LANES).filter(|&lane| self.logs[lane] == own.log) {
                 tape.inputs()[first_parameter + own.parameter][lane] = own.value;
@@ -181,8 +176,7 @@ impl Balance {
         let mut all: Vec<(usize, Vec<f64>)> =
             self.windows.iter().map(|&w| (w, Vec::new())).collect();
         let first = dynamics.layout().parameters_of_balance();
-        let tape = dynamics.program.tape_with_held(first);
-        self.over_rows(tape, first, values, data, |lanes, tape| {
+        self.over_rows(&dynamics.program, first, values, data, |lanes, tape| {
             for (lane, (_, residuals)) in all.iter_mut().enumerate() {
                 if lanes[lane].is_some() {
                     let of_joint = |(j, weight): (usize, &f64)| tape.output(j)[lane] * weight;
@@ -218,8 +212,7 @@ impl Balance {
         let of_joint = |columns: &Vec<usize>| Sums::new(columns.len());
         let mut sums: Vec<Sums> = tangent.columns_of.iter().map(of_joint).collect();
         let first = tangent.first_parameter();
-        let tape = tangent.program.tape_with_held(first);
-        self.over_rows(tape, first, values, data, |lanes, tape| {
+        self.over_rows(&tangent.program, first, values, data, |lanes, tape| {
             let of_joints = sums.iter_mut().zip(&self.weight).zip(tangent.slopes());
             for (j, ((sums, weight), (_, slopes))) in of_joints.enumerate() {
                 let weight: Lane = Row(lanes.map(|at| at.map_or(0.0, |_| weight / scale)));

@@ -196,19 +196,13 @@ fn identifiable_at_most(columns: &Columns<'_>) -> usize {
         .map(|i| columns.fit.columns[*i].parameter)
         .collect();
     let tangent = Tangent::new(columns.dynamics, &active, Local::Nothing);
-    let mut tape = tangent.program.tape::<f64, LANES>();
-    let first = tangent.first_parameter();
-    for (slot, value) in tape.inputs()[first..]
-        .iter_mut()
-        .zip(columns.dynamics.values())
-    {
-        *slot = Row::splat(value);
-    }
+    let (first, values) = (tangent.first_parameter(), columns.dynamics.values());
+    let mut tape = tangent.program.tape_at::<f64, LANES>(first, &values);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     // For all columns: zero for those that belong to no body.
     let mut information = DMatrix::<f64>::zeros(columns.places.len(), columns.places.len());
     for _ in 0..ROWS {
-        for slot in &mut tape.inputs()[..first] {
+        for slot in tape.moving() {
             *slot = Row(std::array::from_fn(|_| StandardNormal.sample(&mut rng)));
         }
         tape.run();

@@ -205,7 +205,7 @@ pub(super) struct TangentStepper<'t> {
     tangent: &'t Tangent,
     scheme: &'static Scheme,
     torque: StepTorque<LANES>,
-    tape: Tape<'t, f64, LANES>,
+    tape: Tape<f64, LANES>,
     /// The state, then the sensitivity of each column: 2n rows each.
     now: Vec<Lane>,
     inner: Vec<Lane>,
@@ -213,7 +213,7 @@ pub(super) struct TangentStepper<'t> {
     sum: Vec<Lane>,
     /// Derivatives of the accelerations with respect to the state, `[joint * 2n + state]`.
     by_state: Vec<Lane>,
-    reading: Option<Tape<'t, f64, LANES>>,
+    reading: Option<Tape<f64, LANES>>,
     /// The measured angles, then their sensitivities `[joint * columns + column]`.
     shown: Vec<Lane>,
 }
@@ -222,29 +222,16 @@ impl<'t> TangentStepper<'t> {
     pub fn new(tangent: &'t Tangent, values: &[f64], scheme: &'static Scheme) -> Self {
         let n = tangent.joints;
         let first = tangent.first_parameter();
-        let mut tape = tangent.program.tape_with_held(first);
-        for (slot, value) in tape.inputs()[first..].iter_mut().zip(values) {
-            *slot = Row::splat(*value);
-        }
-        let mut reading = tangent
-            .reading
-            .as_ref()
-            .map(|reading| reading.tape_with_held(InputLayout::of(n).parameters()));
-        if let Some(reading) = &mut reading {
-            for (slot, value) in reading.inputs()[InputLayout::of(n).parameters()..]
-                .iter_mut()
-                .zip(values)
-            {
-                *slot = Row::splat(*value);
-            }
-        }
+        let reading = tangent.reading.as_ref();
+        let reading =
+            reading.map(|reading| reading.tape_at(InputLayout::of(n).parameters(), values));
         let rows = |count: usize| vec![Row::splat(0.0); count];
         let size = 2 * n * (1 + tangent.columns());
         Self {
             tangent,
             scheme,
             torque: StepTorque::default(),
-            tape,
+            tape: tangent.program.tape_at(first, values),
             now: rows(size),
             inner: rows(size),
             next: rows(size),

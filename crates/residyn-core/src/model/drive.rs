@@ -68,11 +68,8 @@ impl Model {
         let mut torques = vec![Vec::with_capacity(log.rows()); self.joints];
         let channels = || (log.q.iter().chain(&log.qd).chain(&log.tau)).chain([&log.time]);
         let moving = channels().count();
-        let mut tape = program.tape_with_held::<f64, 1>(moving);
-        let values = self.parameters.iter().map(|parameter| parameter.value);
-        for (slot, value) in tape.inputs()[moving..].iter_mut().zip(values) {
-            *slot = Row([value]);
-        }
+        let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
+        let mut tape = program.tape_at::<f64, 1>(moving, &values);
         for row in 0..log.rows() {
             for (slot, channel) in tape.moving().iter_mut().zip(channels()) {
                 *slot = Row([channel[row]]);

@@ -6,7 +6,7 @@ use crate::lanes::Row;
 /// A model with torque filters remembers the torques of all steps since its start; before that they were zero.
 pub struct Environment<'d> {
     model: Point<'d>,
-    simulator: Simulator<'d, 1>,
+    simulator: Simulator<1>,
     integrator: Integrator,
     step_s: f64,
     past: Past,

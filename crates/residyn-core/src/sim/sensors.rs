@@ -8,27 +8,21 @@ use crate::model::InputLayout;
 
 /// The position sensors of a model, for `W` trajectories: they measure the angles of the rig unless an effect, such as
 /// backlash, acts between joint and sensor.
-pub struct Sensors<'d, const W: usize> {
-    tape: Option<Tape<'d, f64, W>>,
+pub struct Sensors<const W: usize> {
+    tape: Option<Tape<f64, W>>,
     joints: usize,
     shown: Vec<Row<f64, W>>,
 }
 
-impl<'d, const W: usize> Sensors<'d, W> {
+impl<const W: usize> Sensors<W> {
     /// The sensors of one model.
-    pub fn new(model: impl Into<Point<'d>>) -> Self {
+    pub fn new<'d>(model: impl Into<Point<'d>>) -> Self {
         let model = model.into();
         let joints = model.dynamics.joints;
+        let first = model.dynamics.layout().parameters();
         let reading = model.dynamics.reading.as_ref();
-        let mut tape = reading.map(|reading| reading.tape());
-        if let Some(tape) = &mut tape {
-            let own = &mut tape.inputs()[model.dynamics.layout().parameters()..];
-            for (slot, value) in own.iter_mut().zip(model.values()) {
-                *slot = Row::splat(*value);
-            }
-        }
         Self {
-            tape,
+            tape: reading.map(|reading| reading.tape_at(first, model.values())),
             joints,
             shown: vec![Row::splat(0.0); joints],
         }
@@ -54,7 +48,7 @@ impl<'d, const W: usize> Sensors<'d, W> {
         let Some(tape) = &mut self.tape else {
             return &state[..n];
         };
-        let (inputs, layout) = (tape.inputs(), InputLayout::of(n));
+        let (inputs, layout) = (tape.moving(), InputLayout::of(n));
         inputs[layout.states()].copy_from_slice(state);
         inputs[layout.driving()].copy_from_slice(&tau());
         inputs[layout.time()] = time;

@@ -3,11 +3,11 @@ use crate::lanes::Row;
 
 /// `W` trajectories of one model side by side: torques are commanded and held, delays and lags turn them into the
 /// acting torques, a scheme integrates the motion, and sensors show its angles.
-pub struct Simulator<'d, const W: usize> {
+pub struct Simulator<const W: usize> {
     /// `[2n][lane]`: positions, then velocities.
     pub state: Vec<Row<f64, W>>,
-    stepper: Stepper<'d, W>,
-    sensors: Sensors<'d, W>,
+    stepper: Stepper<W>,
+    sensors: Sensors<W>,
     torque: StepTorque<W>,
 }
 
@@ -55,14 +55,10 @@ impl<'a, const W: usize> Hold<'a, W> {
         length_s: f64,
         substeps: usize,
     ) -> Self {
+        let to = Row(from.map(|from| from + length_s));
         Self {
-            commands,
-            held,
-            force: &[],
-            from,
-            to: Row(from.map(|from| from + length_s)),
             length: Row::splat(length_s),
-            substeps,
+            ..Self::between(commands, held, [from, to], substeps)
         }
     }
 }
@@ -71,9 +67,9 @@ fn difference<const W: usize>(from: &Row<f64, W>, to: &Row<f64, W>) -> Row<f64, 
     Row(std::array::from_fn(|lane| to[lane] - from[lane]))
 }
 
-impl<'d, const W: usize> Simulator<'d, W> {
+impl<const W: usize> Simulator<W> {
     /// A model at rest at zero.
-    pub fn new(model: impl Into<Point<'d>>, scheme: &'static Scheme) -> Self {
+    pub fn new<'d>(model: impl Into<Point<'d>>, scheme: &'static Scheme) -> Self {
         let model = model.into();
         Self {
             state: vec![Row::splat(0.0); model.dynamics.states()],
@@ -81,14 +77,6 @@ impl<'d, const W: usize> Simulator<'d, W> {
             stepper: Stepper::new(model, scheme),
             torque: StepTorque::default(),
         }
-    }
-
-    /// The model starting at a state (`[2n][lane]`: positions, then velocities).
-    #[must_use]
-    pub fn starting_at(mut self, state: impl IntoIterator<Item = Row<f64, W>>) -> Self {
-        self.state.clear();
-        self.state.extend(state);
-        self
     }
 
     /// Set the value of a parameter in one lane.
@@ -100,14 +88,9 @@ impl<'d, const W: usize> Simulator<'d, W> {
     /// Move the states to the end of a hold.
     pub fn advance(&mut self, hold: &Hold<'_, W>) {
         self.torque.fill(hold);
-        let Hold {
-            from,
-            length,
-            substeps,
-            ..
-        } = *hold;
+        let (state, torque) = (&mut self.state, &self.torque.mean);
         self.stepper
-            .advance(&mut self.state, &self.torque.mean, from, length, substeps);
+            .advance(state, torque, hold.from, hold.length, hold.substeps);
     }
 
     /// Move the states from a row of each lane's command history to the next, in substeps of at most `longest_s`.
@@ -140,7 +123,7 @@ impl<'d, const W: usize> Simulator<'d, W> {
     }
 }
 
-impl Simulator<'_, 1> {
+impl Simulator<1> {
     /// Put the model in this state: positions, then velocities.
     pub fn put(&mut self, state: &[f64]) {
         assert_eq!(state.len(), self.state.len(), "one value for each state");

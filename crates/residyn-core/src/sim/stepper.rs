@@ -4,31 +4,27 @@ use crate::lanes::{Row, Simd, WithSimd};
 use crate::model::InputLayout;
 
 /// Integration of `W` independent states of one model side by side, by one scheme.
-pub struct Stepper<'d, const W: usize> {
+pub struct Stepper<const W: usize> {
     scheme: &'static Scheme,
-    tape: Tape<'d, f64, W>,
+    tape: Tape<f64, W>,
     joints: usize,
     slope: Vec<Row<f64, W>>,
     sum: Vec<Row<f64, W>>,
 }
 
-impl<'d, const W: usize> Stepper<'d, W> {
+impl<const W: usize> Stepper<W> {
     /// A stepper of one model.
-    pub fn new(model: impl Into<Point<'d>>, scheme: &'static Scheme) -> Self {
+    pub fn new<'d>(model: impl Into<Point<'d>>, scheme: &'static Scheme) -> Self {
         let model = model.into();
-        let joints = model.dynamics.joints;
-        let first = model.dynamics.layout().parameters();
-        let mut tape = model.dynamics.program.tape_with_held(first);
-        for (slot, value) in tape.inputs()[first..].iter_mut().zip(model.values()) {
-            *slot = Row::splat(*value);
-        }
-        let states = || vec![Row::splat(0.0); 2 * joints];
+        let dynamics = model.dynamics;
+        let states = vec![Row::splat(0.0); dynamics.states()];
+        let first = dynamics.layout().parameters();
         Self {
             scheme,
-            tape,
-            joints,
-            slope: states(),
-            sum: states(),
+            tape: dynamics.program.tape_at(first, model.values()),
+            joints: dynamics.joints,
+            slope: states.clone(),
+            sum: states,
         }
     }
 
@@ -119,8 +115,8 @@ impl<'d, const W: usize> Stepper<'d, W> {
     }
 }
 
-struct Advance<'a, 'd, const W: usize> {
-    stepper: &'a mut Stepper<'d, W>,
+struct Advance<'a, const W: usize> {
+    stepper: &'a mut Stepper<W>,
     state: &'a mut [Row<f64, W>],
     tau: &'a [Row<f64, W>],
     time: Row<f64, W>,
@@ -128,7 +124,7 @@ struct Advance<'a, 'd, const W: usize> {
     substeps: usize,
 }
 
-impl<const W: usize> WithSimd for Advance<'_, '_, W> {
+impl<const W: usize> WithSimd for Advance<'_, W> {
     type Output = ();
 
     #[inline(always)]

@@ -5,16 +5,16 @@ use residyn_core::sim::batch::W;
 /// The programs of a structure as tapes, one for each thread.
 #[derive(Debug)]
 pub(super) struct Programs {
-    pub program: Tape<'static, f32, W>,
-    pub adjoint: Tape<'static, f32, W>,
-    pub parameter_adjoint: Tape<'static, f32, W>,
+    pub program: Tape<f32, W>,
+    pub adjoint: Tape<f32, W>,
+    pub parameter_adjoint: Tape<f32, W>,
 }
 
 impl Programs {
     pub(super) fn new(structure: &Structure) -> Self {
         let tape = |program: &Program| {
             let first = program.inputs().len() - structure.parameters().len();
-            program.tape_with_held(first).into_owned()
+            program.tape_with_held(first)
         };
         Self {
             program: tape(&structure.program),

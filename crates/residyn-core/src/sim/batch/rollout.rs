@@ -33,7 +33,7 @@ pub struct Added {
 pub struct Block<'r> {
     rollouts: &'r Rollouts,
     arch: Arch,
-    tape: Tape<'r, f32, W>,
+    tape: Tape<f32, W>,
     /// State at the start of the step, and the state accumulated so far for its end: positions, then velocities.
     state: Vec<Rows>,
     next: Vec<Rows>,
@@ -61,9 +61,8 @@ impl Rollouts {
         step_s: f64,
     ) -> Self {
         for network in networks {
-            network
-                .check(equations.joints)
-                .expect("networks of this system");
+            let checked = network.check(equations.joints);
+            checked.expect("networks of this system");
         }
         Self {
             joints: equations.joints,
@@ -97,12 +96,8 @@ impl Rollouts {
     /// Working memory for one block.
     pub fn block(&self) -> Block<'_> {
         let first = 4 * self.joints + 1;
-        let mut tape = self.program.tape_with_held(first);
-        for (slot, value) in tape.inputs()[first..].iter_mut().zip(&self.parameters) {
-            *slot = Rows::splat(*value);
-        }
-        let states = || vec![Rows::splat(0.0); 2 * self.joints];
         let rows = |count: usize| vec![Rows::splat(0.0); count];
+        let states = || rows(2 * self.joints);
         let values = |added: &Added| {
             let network = &added.network;
             [rows(network.features()), rows(network.activations())]
@@ -110,7 +105,7 @@ impl Rollouts {
         Block {
             rollouts: self,
             arch: Arch::new(),
-            tape,
+            tape: self.program.tape_at(first, &self.parameters),
             state: states(),
             next: states(),
             rates: states(),
@@ -147,17 +142,12 @@ fn whole(equations: &Dynamics, networks: &[MlpWeights], objective: &Program) -> 
     let (until_now, parameters) = (write(&until_now), write(parameters));
     let inputs = [moving.as_slice(), &parameters].concat();
     let mut outputs = graph.append(&equations.program, &inputs);
-    let seen = [
-        &moving[layout.states()],
-        &until_now,
-        &moving[layout.time()..],
-    ]
-    .concat();
-    let reward = graph.append(objective, &seen);
+    let (states, time) = (&moving[layout.states()], &moving[layout.time()..]);
+    let reward = graph.append(objective, &[states, &until_now, time].concat());
     assert_eq!(reward.len(), 1, "an objective is one number");
     outputs.extend(reward);
     for network in networks {
-        let (q, qd) = moving[layout.states()].split_at(n);
+        let (q, qd) = states.split_at(n);
         outputs.extend(network.features(&mut graph, q, qd, &moving[layout.driving()]));
     }
     graph.finish(&outputs)
@@ -185,10 +175,8 @@ impl Block<'_> {
     ) {
         let n = self.rollouts.joints;
         assert_eq!(start.len(), 2 * n, "one value for each state");
-        assert!(
-            !inputs.is_empty() && inputs.len().is_multiple_of(n),
-            "whole steps"
-        );
+        let is_whole = inputs.len().is_multiple_of(n);
+        assert!(!inputs.is_empty() && is_whole, "whole steps");
         let mut filtered = std::mem::take(&mut self.acting);
         let acting = match &self.rollouts.memory {
             None => inputs,
@@ -224,31 +212,19 @@ impl WithSimd for Run<'_, '_> {
     /// One evaluation in the innermost loop, also for the reward after the last step, so that it is inlined only once.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self {
-            block,
-            start,
-            time_s,
-            inputs,
-            acting,
-            returns,
-        } = self;
-        let Rollouts {
-            joints: n,
-            integrator,
-            step_s,
-            ..
-        } = *block.rollouts;
+        let (block, inputs, returns) = (self.block, self.inputs, self.returns);
+        let (n, integrator) = (block.rollouts.joints, block.rollouts.integrator);
         let layout = InputLayout::of(n);
         let (stages, substeps) = (integrator.scheme().stages, integrator.substeps());
-        let (steps, h) = (inputs.len() / n, step_s / substeps as f32);
-        for (row, value) in block.next.iter_mut().zip(start) {
+        let (steps, h) = (inputs.len() / n, block.rollouts.step_s / substeps as f32);
+        for (row, value) in block.next.iter_mut().zip(self.start) {
             *row = Rows::splat(*value);
         }
         *returns = Rows::splat(0.0);
         for step in 0..=steps {
-            block.hold(inputs, acting, step);
+            block.hold(inputs, self.acting, step);
             for substep in 0..substeps {
-                let begin_s = time_s + (step * substeps + substep) as f32 * h;
+                let begin_s = self.time_s + (step * substeps + substep) as f32 * h;
                 block.begin();
                 for (k, stage) in stages.iter().enumerate() {
                     let [time, reach, weight] =

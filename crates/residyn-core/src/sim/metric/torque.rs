@@ -48,12 +48,31 @@ const STRETCH_S: f64 = 2.0;
 /// longer than a second.
 pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
     let balance = model.torque_balance()?;
-    let differences = logs.par_iter().map(|log| differences(&balance, log));
-    let mut sums = Sums::new(model.joints);
-    for (smooth, differences) in differences.collect::<Vec<_>>() {
-        sums.add(&smooth, &differences);
-    }
-    sums.error()
+    let found = logs.par_iter().map(|log| differences(&balance, log));
+    let found: Vec<(Smooth, Vec<Vec<f64>>)> = found.collect();
+    let rows: usize = found.iter().map(|(logged, _)| logged.rows()).sum();
+    let squares = |channel: &Vec<f64>| channel.iter().map(|x| x * x).sum::<f64>();
+    let of_joint = |j: usize| -> f64 { found.iter().map(|(_, of)| squares(&of[j])).sum() };
+    let differences: Vec<f64> = (0..model.joints).map(of_joint).collect();
+    let of_torques = |logged: &Smooth| logged.tau.iter().map(squares).sum::<f64>();
+    let torques: f64 = found.iter().map(|(logged, _)| of_torques(logged)).sum();
+    (rows > 0).then(|| TorqueError {
+        rms: (differences.iter())
+            .map(|sum| (sum / rows as f64).sqrt())
+            .collect(),
+        relative: (differences.iter().sum::<f64>() / torques).sqrt(),
+        blocks: found.iter().flat_map(blocks).collect(),
+    })
+}
+
+/// The squares of the differences of all joints, summed over each [`STRETCH_S`] of a log.
+fn blocks((logged, differences): &(Smooth, Vec<Vec<f64>>)) -> Vec<f64> {
+    let start = logged.time.first().copied().unwrap_or(0.0);
+    let block = |row: &usize| ((logged.time[*row] - start) / STRETCH_S).floor();
+    let square = |row: &usize| differences.iter().map(|of| of[*row].powi(2)).sum::<f64>();
+    let rows: Vec<usize> = (0..logged.rows()).collect();
+    let blocks = rows.chunk_by(|a, b| block(a) == block(b));
+    blocks.map(|rows| rows.iter().map(square).sum()).collect()
 }
 
 /// Where the torques that a model needs for the logged motion are first not finite: the log, and the time in s.
@@ -105,29 +124,17 @@ fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
 /// The values of a torque balance along a smoothed motion with its torques, `[joint][row]`.
 pub(crate) fn balance_of(balance: &Dynamics, acting: &Smooth) -> Vec<Vec<f64>> {
     let values = balance.values();
-    let mut tape = balance.program.tape::<f64, LANES>();
+    let first = balance.program.inputs().len() - values.len();
+    let mut tape = balance.program.tape_at::<f64, LANES>(first, &values);
     let mut found = vec![vec![0.0; acting.rows()]; balance.joints];
     for first in (0..acting.rows()).step_by(LANES) {
         let rows: [usize; LANES] = std::array::from_fn(|k| (first + k).min(acting.rows() - 1));
         let of_rows = |channel: &[f64]| Row(rows.map(|row| channel[row]));
-        let Smooth {
-            time,
-            q,
-            qd,
-            qdd,
-            tau,
-            ..
-        } = acting;
-        let moving = [q, qd, tau]
-            .into_iter()
-            .flatten()
-            .map(|channel| of_rows(channel));
-        let inputs = moving
-            .chain([of_rows(time)])
-            .chain(qdd.iter().map(|channel| of_rows(channel)))
-            .chain(values.iter().map(|value| Row::splat(*value)));
-        for (slot, input) in tape.inputs().iter_mut().zip(inputs) {
-            *slot = input;
+        let channels = (acting.q.iter().chain(&acting.qd).chain(&acting.tau))
+            .chain([&acting.time])
+            .chain(&acting.qdd);
+        for (slot, channel) in tape.moving().iter_mut().zip(channels) {
+            *slot = of_rows(channel);
         }
         tape.run();
         for (j, found) in found.iter_mut().enumerate() {
@@ -137,52 +144,4 @@ pub(crate) fn balance_of(balance: &Dynamics, acting: &Smooth) -> Vec<Vec<f64>> {
         }
     }
     found
-}
-
-/// Sums of squares.
-struct Sums {
-    blocks: Vec<f64>,
-    differences: Vec<f64>,
-    torques: f64,
-    rows: usize,
-}
-
-impl Sums {
-    fn new(joints: usize) -> Self {
-        Self {
-            blocks: Vec::new(),
-            differences: vec![0.0; joints],
-            torques: 0.0,
-            rows: 0,
-        }
-    }
-
-    fn add(&mut self, logged: &Smooth, differences: &[Vec<f64>]) {
-        let squares = |channel: &Vec<f64>| channel.iter().map(|x| x * x).sum::<f64>();
-        for (sum, differences) in self.differences.iter_mut().zip(differences) {
-            *sum += squares(differences);
-        }
-        let start = logged.time.first().copied().unwrap_or(0.0);
-        let block = |row: &usize| ((logged.time[*row] - start) / STRETCH_S).floor();
-        let rows: Vec<usize> = (0..logged.rows()).collect();
-        for of_block in rows.chunk_by(|a, b| block(a) == block(b)) {
-            let square = |row: &usize| differences.iter().map(|of| of[*row].powi(2)).sum::<f64>();
-            self.blocks.push(of_block.iter().map(square).sum());
-        }
-        self.torques += logged.tau.iter().map(squares).sum::<f64>();
-        self.rows += logged.rows();
-    }
-
-    fn error(self) -> Option<TorqueError> {
-        let all: f64 = self.differences.iter().sum();
-        (self.rows > 0).then(|| TorqueError {
-            rms: self
-                .differences
-                .iter()
-                .map(|sum| (sum / self.rows as f64).sqrt())
-                .collect(),
-            relative: (all / self.torques).sqrt(),
-            blocks: self.blocks,
-        })
-    }
 }
