@@ -8,7 +8,7 @@ use crate::data::{Joint, Log, Smooth, Smoothing, row_from};
 use crate::expr::{Program, Tape};
 use crate::lanes::Row;
 use crate::model::{Dynamics, InputLayout};
-use crate::sim::{Commands, Delivered, Point, Window};
+use crate::sim::{Commands, Mean, Point, Window};
 
 /// A log as the torque error reads it, thinned out.
 pub(super) struct Rows {
@@ -49,22 +49,24 @@ impl Acting {
         for (index, (log, rows)) in logs.iter().zip(rows).enumerate() {
             let own = values.of_log(index);
             let commands = Commands::of_log(Point::new(dynamics, &own), log);
-            let smoothed = |channel: &[f64]| rows.smoothing.channel(channel);
-            let filtered: Vec<Option<Delivered>> = Joint::all(dynamics.joints)
+            let smoothed = |means: &[Mean], of: &dyn Fn(&Mean) -> f64| {
+                let channel: Vec<f64> = means.iter().map(of).collect();
+                rows.smoothing.channel(&channel)
+            };
+            let filtered: Vec<Option<Vec<Mean>>> = Joint::all(dynamics.joints)
                 .map(|joint| commands.delivered(joint))
                 .collect();
             let tau = (rows.smooth.tau.iter().zip(&filtered)).map(|(tau, filtered)| {
-                let filtered = filtered.as_ref().map(|delivered| smoothed(&delivered.tau));
+                let filtered = filtered
+                    .as_ref()
+                    .map(|means| smoothed(means, &|mean| mean.value));
                 filtered.unwrap_or_else(|| tau.clone())
             });
             acting.tau.push(tau.collect());
             let slopes = dynamics.filters.iter().map(|filter| {
-                let delivered = filtered[filter.joint].as_ref();
-                smoothed(
-                    delivered
-                        .expect("the joint has a filter")
-                        .slopes(filter.kind),
-                )
+                let means = filtered[filter.joint].as_ref();
+                let means = means.expect("the joint has a filter");
+                smoothed(means, &|mean| mean.slope(filter.kind))
             });
             acting.slopes.push(slopes.collect());
         }

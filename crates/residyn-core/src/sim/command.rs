@@ -20,33 +20,24 @@ pub struct Commands<'l> {
     histories: Vec<Option<History<'l>>>,
 }
 
-/// Mean torques that a joint's drive delivers from each row of a log to the next.
-pub struct Delivered {
-    /// N m (or N).
-    pub tau: Vec<f64>,
-    /// Derivatives with respect to the delay and the time constant, per s.
-    by_delay: Vec<f64>,
-    by_lag: Vec<f64>,
-}
-
-impl Delivered {
-    /// The derivatives with respect to the parameter of a filter.
-    pub fn slopes(&self, kind: CommandFilter) -> &[f64] {
-        match kind {
-            CommandFilter::Delay => &self.by_delay,
-            CommandFilter::Lag => &self.by_lag,
-        }
-    }
-}
-
-/// The acting torque over one substep.
+/// The torque that acts on a joint, averaged over some time.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Mean {
+pub struct Mean {
     /// In N m (or N).
-    value: f64,
+    pub value: f64,
     /// Derivatives of the value with respect to the delay and the time constant, per s.
     by_delay: f64,
     by_lag: f64,
+}
+
+impl Mean {
+    /// The derivative with respect to the parameter of a filter.
+    pub fn slope(&self, kind: CommandFilter) -> f64 {
+        match kind {
+            CommandFilter::Delay => self.by_delay,
+            CommandFilter::Lag => self.by_lag,
+        }
+    }
 }
 
 impl<'l> Commands<'l> {
@@ -85,12 +76,9 @@ impl<'l> Commands<'l> {
 
     /// The commanded torques (`[joint][lane]`) held from one row per lane on.
     pub(super) fn held<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Vec<Row<f64, W>> {
+        let held = |joint: usize, lane: usize| commands[lane].tau[joint][rows[lane]];
         (0..commands[0].joints)
-            .map(|joint| {
-                Row(std::array::from_fn(|lane| {
-                    commands[lane].tau[joint][rows[lane]]
-                }))
-            })
+            .map(|joint| Row(std::array::from_fn(|lane| held(joint, lane))))
             .collect()
     }
 
@@ -111,33 +99,33 @@ impl<'l> Commands<'l> {
     /// The log with commanded torques replaced by the mean acting torque from each row to the next.
     #[must_use]
     pub fn acting_on(&self, log: &Log) -> Log {
-        let mut acting = log.clone();
-        for (joint, tau) in Joint::all(self.joints).zip(&mut acting.tau) {
-            if let Some(filtered) = self.delivered(joint) {
-                *tau = filtered.tau;
-            }
+        Log {
+            tau: self.acting(),
+            ..log.clone()
         }
-        acting
     }
 
-    /// What the drive of a joint delivers, if it has a filter.
-    pub fn delivered(&self, joint: Joint) -> Option<Delivered> {
+    /// The mean acting torque from each row to the next, `[joint][row]`.
+    pub fn acting(&self) -> Vec<Vec<f64>> {
+        let of_joint = |(joint, commanded): (Joint, &Vec<f64>)| match self.delivered(joint) {
+            Some(means) => means.iter().map(|mean| mean.value).collect(),
+            None => commanded.clone(),
+        };
+        let all = Joint::all(self.joints).zip(self.tau);
+        all.map(of_joint).collect()
+    }
+
+    /// What the drive of a joint delivers from each row to the next, if it has a filter.
+    pub fn delivered(&self, joint: Joint) -> Option<Vec<Mean>> {
         let history = self.histories[joint].as_ref()?;
-        let ends = self.time.iter().map(|time| history.at(*time));
-        let ends: Vec<Instant> = ends.collect();
-        let mean = |ends: &[Instant]| ends[0].mean_until(&ends[1]);
-        let means: Vec<Mean> = ends.windows(2).map(mean).collect();
+        let ends: Vec<Instant> = self.time.iter().map(|time| history.at(*time)).collect();
+        let means = ends.windows(2).map(|ends| ends[0].mean_until(&ends[1]));
         // The last command is held for ever.
         let last = Mean {
             value: *self.tau[joint].last()?,
             ..Mean::default()
         };
-        let each = |part: fn(&Mean) -> f64| means.iter().chain([&last]).map(part).collect();
-        Some(Delivered {
-            tau: each(|mean| mean.value),
-            by_delay: each(|mean| mean.by_delay),
-            by_lag: each(|mean| mean.by_lag),
-        })
+        Some(means.chain([last]).collect())
     }
 }
 
@@ -173,8 +161,8 @@ impl<const W: usize> StepTorque<W> {
             self.mean.extend_from_slice(hold.held);
         }
         self.slopes.resize(parts * filters, Row::splat(0.0));
-        for lane in 0..W {
-            self.filter(lane, hold);
+        for (lane, commands) in hold.commands.iter().enumerate() {
+            self.filter(lane, commands, hold);
         }
         for (tau, force) in self.mean.iter_mut().zip(hold.force.iter().cycle()) {
             for lane in 0..W {
@@ -184,13 +172,18 @@ impl<const W: usize> StepTorque<W> {
     }
 
     /// Write the filtered torques of one lane.
-    fn filter(&mut self, lane: usize, hold: &Hold<'_, W>) {
-        let model = hold.commands[lane];
+    fn filter(&mut self, lane: usize, commands: &Commands<'_>, hold: &Hold<'_, W>) {
         let (from, to) = (hold.from[lane], hold.to[lane]);
-        for (joint, history) in Joint::all(model.joints).zip(&model.histories) {
+        for (joint, history) in Joint::all(commands.joints).zip(&commands.histories) {
             let Some(history) = history else { continue };
             for (part, mean) in history.means(from, to, hold.substeps).enumerate() {
-                self.set(lane, joint, model, part, mean);
+                self.mean[part * commands.joints + joint.index()][lane] = mean.value;
+                let slopes = self.slopes[part * commands.filters.len()..].iter_mut();
+                for (slope, filter) in slopes.zip(&commands.filters) {
+                    if filter.joint == joint {
+                        slope[lane] = mean.slope(filter.kind);
+                    }
+                }
             }
         }
     }
@@ -212,18 +205,6 @@ impl<const W: usize> StepTorque<W> {
             &self.mean[part * joints..][..joints],
             &self.slopes[part * filters..][..filters],
         )
-    }
-
-    fn set(&mut self, lane: usize, joint: Joint, model: &Commands<'_>, part: usize, mean: Mean) {
-        self.mean[part * model.joints + joint.index()][lane] = mean.value;
-        for (k, filter) in model.filters.iter().enumerate() {
-            if filter.joint == joint {
-                self.slopes[part * model.filters.len() + k][lane] = match filter.kind {
-                    CommandFilter::Delay => mean.by_delay,
-                    CommandFilter::Lag => mean.by_lag,
-                };
-            }
-        }
     }
 }
 

@@ -14,7 +14,7 @@ mod stepper;
 mod substeps;
 mod window;
 
-pub use command::{Commands, Delivered, StepTorque};
+pub use command::{Commands, Mean, StepTorque};
 pub use environment::Environment;
 pub use integrator::{Integrator, IntegratorError};
 pub use objective::Objective;

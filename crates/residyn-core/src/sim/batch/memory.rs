@@ -1,5 +1,4 @@
 use super::Rows;
-use crate::data::Log;
 use crate::lanes::{Arch, Simd, Vector, WithSimd};
 use crate::model::Dynamics;
 use crate::model::to_f32;
@@ -25,16 +24,12 @@ impl Memory {
             return None;
         }
         // The first command counts as held for ever before, so the impulse is the second.
-        let mut impulse = Log::empty(equations.joints);
-        impulse.time = (0..MOST_STEPS + 2).map(|row| step_s * row as f64).collect();
-        let mut tau = vec![0.0; impulse.rows()];
-        tau[1] = 1.0;
-        impulse.tau.fill(tau);
-        let commands = Commands::of_log(equations, &impulse);
-        let response = commands.acting_on(&impulse).tau;
-        let weights = response
-            .iter()
-            .map(|tau| until_little_is_left(&tau[1..=MOST_STEPS]));
+        let time: Vec<f64> = (0..MOST_STEPS + 2).map(|row| step_s * row as f64).collect();
+        let mut impulse = vec![0.0; time.len()];
+        impulse[1] = 1.0;
+        let response = Commands::new(equations, &time, &vec![impulse; equations.joints]).acting();
+        let weights = response.iter();
+        let weights = weights.map(|tau| until_little_is_left(&tau[1..=MOST_STEPS]));
         Some(Self {
             weights: weights.collect(),
         })
