@@ -1,5 +1,7 @@
 //! Open-loop errors window by window, horizon by horizon.
 
+use super::summary::root_mean;
+
 /// Squared errors of one window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WindowError {
@@ -44,10 +46,6 @@ impl Assessment {
     /// Position error of all joints together at the middle horizon: root of the mean over rows of the sum over
     /// joints, rad (or m).
     pub fn position_rms(&self) -> f64 {
-        let windows = &self.middle().windows;
-        let rows: usize = windows.iter().map(|w| w.rows).sum();
-        #[allow(clippy::cast_precision_loss)] // rows are far fewer than 2^52
-        let rows = rows.max(1) as f64;
-        (windows.iter().flat_map(|w| &w.position).sum::<f64>() / rows).sqrt()
+        root_mean(&self.middle().windows, |window| &window.position)
     }
 }

@@ -25,11 +25,12 @@ const SHORTEST_STEP_S: f64 = PREDICTION_S / 64.0;
 /// Windows start every half horizon and last one horizon; their start states come from the log alone. The logged torque
 /// is held over each step.
 pub fn assess(dynamics: &Dynamics, logs: &[Log], horizons_s: &[f64]) -> Assessment {
-    let models: Vec<Cow<'_, Dynamics>> = logs.iter().map(|log| dynamics.in_log(log)).collect();
+    let models = in_logs(dynamics, logs);
+    let replays = replays(&models, logs);
     let mut step_s = PREDICTION_S;
-    let mut coarse = summarise(&run(&models, logs, horizons_s, step_s), dynamics.joints);
+    let mut coarse = summarise(&run(&replays, horizons_s, step_s), dynamics.joints);
     loop {
-        let horizons = run(&models, logs, horizons_s, step_s / 2.0);
+        let horizons = run(&replays, horizons_s, step_s / 2.0);
         let fine = summarise(&horizons, dynamics.joints);
         let step_error = largest_change(&coarse, &fine);
         if step_error <= STEP_TOLERANCE || step_s / 2.0 <= SHORTEST_STEP_S {
@@ -44,21 +45,15 @@ pub fn assess(dynamics: &Dynamics, logs: &[Log], horizons_s: &[f64]) -> Assessme
     }
 }
 
-/// `models` gives the model in each log.
-fn run(
-    models: &[Cow<'_, Dynamics>],
-    logs: &[Log],
-    horizons_s: &[f64],
-    step_s: f64,
-) -> Vec<OpenLoop> {
-    let replays = replays(models, logs);
-    let all = |horizon_s: f64| -> Vec<Window> {
-        let of_log = |(index, log)| windows(index, log, horizon_s);
-        logs.iter().enumerate().flat_map(of_log).collect()
-    };
-    let one = |&horizon_s: &f64| OpenLoop {
-        horizon_s,
-        windows: errors(&replays, &all(horizon_s), step_s),
+/// `replays` has one entry per log.
+fn run(replays: &[Replay<'_>], horizons_s: &[f64], step_s: f64) -> Vec<OpenLoop> {
+    let one = |&horizon_s: &f64| {
+        let logs = replays.iter().map(|replay| replay.log);
+        let all: Vec<Window> = all_windows(logs, horizon_s).collect();
+        OpenLoop {
+            horizon_s,
+            windows: errors(replays, &all, step_s),
+        }
     };
     horizons_s.iter().map(one).collect()
 }
@@ -70,16 +65,18 @@ pub fn errors_in(
     windows: &[Window],
     step_s: f64,
 ) -> Vec<WindowError> {
-    let models: Vec<Cow<'_, Dynamics>> = logs.iter().map(|log| dynamics.in_log(log)).collect();
-    let replays = replays(&models, logs);
-    errors(&replays, windows, step_s)
+    errors(&replays(&in_logs(dynamics, logs), logs), windows, step_s)
+}
+
+/// The model in each log.
+fn in_logs<'d>(dynamics: &'d Dynamics, logs: &[Log]) -> Vec<Cow<'d, Dynamics>> {
+    logs.iter().map(|log| dynamics.in_log(log)).collect()
 }
 
 /// `models` gives the model in each log.
-fn replays<'l>(models: &'l [Cow<'l, Dynamics>], logs: &'l [Log]) -> Vec<Replay<'l>> {
-    (models.iter().zip(logs))
-        .map(|(model, log)| Replay::new(Point::from(&**model), log))
-        .collect()
+fn replays<'l>(models: &'l [Cow<'_, Dynamics>], logs: &'l [Log]) -> Vec<Replay<'l>> {
+    let each = models.iter().zip(logs);
+    each.map(|(model, log)| Replay::new(model, log)).collect()
 }
 
 /// `replays` has one entry per log.
@@ -97,10 +94,15 @@ fn errors(replays: &[Replay<'_>], windows: &[Window], step_s: f64) -> Vec<Window
 
 /// Number of windows of `horizon_s` seconds in the logs.
 pub fn window_count(logs: &[Log], horizon_s: f64) -> usize {
-    logs.iter()
-        .enumerate()
-        .map(|(index, log)| windows(index, log, horizon_s).len())
-        .sum()
+    all_windows(logs.iter(), horizon_s).count()
+}
+
+fn all_windows<'l>(
+    logs: impl Iterator<Item = &'l Log>,
+    horizon_s: f64,
+) -> impl Iterator<Item = Window> {
+    let each = logs.enumerate();
+    each.flat_map(move |(index, log)| windows(index, log, horizon_s))
 }
 
 /// The windows of one log: one every half horizon, from the first row at which the state can be estimated.
@@ -146,9 +148,9 @@ fn starts(log: &Log, begin: f64, horizon_s: f64) -> impl Iterator<Item = f64> {
 }
 
 /// A log and the model at its values in that log.
-struct Replay<'l> {
-    model: Point<'l>,
-    commands: Commands<'l>,
+pub(super) struct Replay<'l> {
+    pub model: Point<'l>,
+    pub commands: Commands<'l>,
     log: &'l Log,
     /// The log with the rig's own angles, from which start states are estimated, and half the time span of that
     /// estimate, s.
@@ -157,7 +159,8 @@ struct Replay<'l> {
 }
 
 impl<'l> Replay<'l> {
-    fn new(model: Point<'l>, log: &'l Log) -> Self {
+    pub fn new(model: &'l Dynamics, log: &'l Log) -> Self {
+        let model = Point::from(model);
         Self {
             commands: Commands::of_log(&model, log),
             own: with_own_angles(&model, log),
@@ -195,14 +198,16 @@ impl<'l> Replay<'l> {
 
     /// The states (`[2n][lane]`) at the windows' starts; empty lanes repeat the last.
     fn starts(&self, pack: &[Window]) -> Vec<Row<f64, LANES>> {
-        let starts: Vec<Vec<f64>> = (pack.iter())
-            .map(|w| {
-                initial_state(&self.own, self.half_width_s, w.first).expect("windows() checks this")
-            })
-            .collect();
+        let starts: Vec<Vec<f64>> = pack.iter().map(|window| self.start(window)).collect();
         (0..self.model.dynamics.states())
             .map(|k| Row(std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k])))
             .collect()
+    }
+
+    /// The state at the window's start.
+    pub fn start(&self, window: &Window) -> Vec<f64> {
+        let state = initial_state(&self.own, self.half_width_s, window.first);
+        state.expect("windows() checks this")
     }
 }
 
@@ -250,21 +255,10 @@ impl WindowError {
 }
 
 fn largest_change(coarse: &Summary, fine: &Summary) -> f64 {
-    let numbers = |summary: &Summary| -> Vec<f64> {
-        let Summary {
-            position_rmse,
-            position_median,
-            velocity_rmse,
-            ..
-        } = summary;
-        [position_rmse, position_median, velocity_rmse]
-            .into_iter()
-            .flatten()
-            .flatten()
-            .copied()
-            .collect()
+    let numbers = |of: &Summary| {
+        [&of.position_rmse, &of.position_median, &of.velocity_rmse].map(|table| table.concat())
     };
-    let pairs = numbers(coarse).into_iter().zip(numbers(fine));
+    let pairs = (numbers(coarse).into_iter().flatten()).zip(numbers(fine).into_iter().flatten());
     pairs
         .map(|(a, b)| (a - b).abs() / b.abs().max(f64::MIN_POSITIVE))
         .fold(0.0, f64::max)

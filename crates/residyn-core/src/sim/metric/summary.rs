@@ -28,26 +28,23 @@ pub fn summarise(horizons: &[OpenLoop], joints: usize) -> Summary {
     };
     Summary {
         horizons_s: horizons.iter().map(|horizon| horizon.horizon_s).collect(),
-        position_rmse: per_joint(&|horizon, j| root_mean(&horizon.windows, |w| w.position[j])),
+        position_rmse: per_joint(&|horizon, j| root_mean(&horizon.windows, |w| &w.position[j..=j])),
         position_median: per_joint(&|horizon, j| {
-            let of_window = |w| root_mean(std::slice::from_ref(w), |w| w.position[j]);
+            let of_window = |w| root_mean(std::slice::from_ref(w), |w| &w.position[j..=j]);
             median(&horizon.windows.iter().map(of_window).collect::<Vec<_>>())
         }),
-        velocity_rmse: per_joint(&|horizon, j| root_mean(&horizon.windows, |w| w.velocity[j])),
-        windows: horizons
-            .iter()
-            .map(|horizon| horizon.windows.len())
-            .collect(),
-        diverged: horizons
-            .iter()
-            .map(|horizon| horizon.windows.iter().filter(|w| w.diverged).count())
+        velocity_rmse: per_joint(&|horizon, j| root_mean(&horizon.windows, |w| &w.velocity[j..=j])),
+        windows: horizons.iter().map(|of| of.windows.len()).collect(),
+        diverged: (horizons.iter())
+            .map(|of| of.windows.iter().filter(|w| w.diverged).count())
             .collect(),
     }
 }
 
-fn root_mean(windows: &[WindowError], squares: impl Fn(&WindowError) -> f64) -> f64 {
+/// The root of the sum of squares, several per window, over the number of rows.
+pub(super) fn root_mean(windows: &[WindowError], squares: impl Fn(&WindowError) -> &[f64]) -> f64 {
     let rows: usize = windows.iter().map(|w| w.rows).sum();
     #[allow(clippy::cast_precision_loss)] // rows are far fewer than 2^52
     let rows = rows.max(1) as f64;
-    (windows.iter().map(squares).sum::<f64>() / rows).sqrt()
+    (windows.iter().flat_map(squares).sum::<f64>() / rows).sqrt()
 }

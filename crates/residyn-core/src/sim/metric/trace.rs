@@ -1,8 +1,7 @@
-use crate::data::{Log, half_width_s};
+use super::open_loop::{Replay, windows};
+use crate::data::Log;
 use crate::model::Dynamics;
-use crate::sim::{
-    Commands, PREDICTION_S, Point, RK4, Simulator, Window, initial_state, with_own_angles,
-};
+use crate::sim::{PREDICTION_S, RK4, Simulator, Window};
 
 /// One open-loop prediction: times in s and, for each joint, angles in rad (or m).
 #[derive(Debug, Clone, PartialEq)]
@@ -15,31 +14,16 @@ pub struct Trace {
 /// Consecutive predictions of `horizon_s` seconds along a log, each started from the log, for pictures.
 pub fn traces(dynamics: &Dynamics, log: &Log, horizon_s: f64) -> Vec<Trace> {
     let in_log = dynamics.in_log(log);
-    let model = Point::from(&*in_log);
-    let commands = Commands::of_log(&model, log);
-    let own = with_own_angles(&model, log);
-    let half_width = half_width_s(log.median_step());
+    let replay = Replay::new(&in_log, log);
     // The windows of the error overlap by half: every second window covers the log once.
-    super::open_loop::windows(0, log, horizon_s)
-        .iter()
-        .step_by(2)
-        .map(|window| {
-            let start =
-                initial_state(&own, half_width, window.first).expect("windows() checks this");
-            trace(&model, &commands, log, window, &start)
-        })
-        .collect()
+    let windows = windows(0, log, horizon_s).into_iter().step_by(2);
+    windows.map(|window| trace(&replay, log, &window)).collect()
 }
 
-fn trace(
-    model: &Point<'_>,
-    commands: &Commands<'_>,
-    log: &Log,
-    window: &Window,
-    start: &[f64],
-) -> Trace {
-    let mut simulator = Simulator::new(model, RK4);
-    simulator.put(start);
+fn trace(replay: &Replay<'_>, log: &Log, window: &Window) -> Trace {
+    let commands = &replay.commands;
+    let mut simulator = Simulator::new(&replay.model, RK4);
+    simulator.put(&replay.start(window));
     let mut trace = Trace {
         time: Vec::new(),
         q: vec![Vec::new(); log.q.len()],
