@@ -14,8 +14,8 @@ const SETTINGS: Settings = Settings {
     method: Method::Cem(Cem { elite: 20 }),
 };
 
-/// The closer every input is to a goal, the better; from 2 on the return is unknown.
-struct Near;
+/// The closer every input is to a goal, the better, in some unit of return; from 2 on the return is unknown.
+struct Near(f32);
 
 impl Evaluate for Near {
     type Start = f32;
@@ -32,7 +32,7 @@ impl Evaluate for Near {
                 .map(|row| (row[lane] - goal).powi(2))
                 .sum::<f32>();
             let known = inputs.iter().all(|row| row[lane] < 2.0);
-            returns[lane] = if known { -off } else { f32::NAN };
+            returns[lane] = if known { -off * self.0 } else { f32::NAN };
         }
     }
 }
@@ -55,7 +55,7 @@ fn all() -> [Settings; 3] {
 }
 
 fn near(settings: &Settings, bounds: &[[f64; 2]], seed: u64) -> Planner<Near> {
-    Planner::new(settings, bounds, || Near, &rng(seed))
+    Planner::new(settings, bounds, || Near(1.0), &rng(seed))
 }
 
 /// The largest distance of a plan's inputs from the goal.
@@ -192,7 +192,7 @@ fn icem_never_loses_its_best_candidate() {
             .map(|step| Rows::splat(step[0] as f32))
             .collect();
         let mut returns = Rows::splat(0.0);
-        Near.returns(&0.7, &sequence, &mut returns);
+        Near(1.0).returns(&0.7, &sequence, &mut returns);
         assert_eq!(f64::from(returns[0]), plan.best);
     }
 }
@@ -226,31 +226,14 @@ fn the_unexecuted_part_of_a_kept_sequence_is_a_candidate() {
     assert_ne!(rows[0][0], 0.3);
 }
 
-/// As [`Near`], in other units.
-struct Scaled;
-
-impl Evaluate for Scaled {
-    type Start = f32;
-    type Prepared = f32;
-
-    fn prepare(&self, goal: f32, _: usize) -> f32 {
-        goal
-    }
-
-    fn returns(&mut self, goal: &f32, inputs: &[Rows], returns: &mut Rows) {
-        Near.returns(goal, inputs, returns);
-        // A power of two: nothing is rounded.
-        returns.iter_mut().for_each(|value| *value *= 1024.0);
-    }
-}
-
 #[test]
 fn mppi_is_invariant_to_scale_and_offset_of_returns() {
     let settings = Settings {
         method: Method::Mppi(Mppi::default()),
         ..SETTINGS
     };
-    let scaled = Planner::new(&settings, &[[-3.0, 3.0]], || Scaled, &rng(9));
+    // A power of two: nothing is rounded.
+    let scaled = Planner::new(&settings, &[[-3.0, 3.0]], || Near(1024.0), &rng(9));
     let plan = near(&settings, &[[-3.0, 3.0]], 9).plan(0.7);
     assert_eq!(scaled.plan(0.7).inputs, plan.inputs);
 }

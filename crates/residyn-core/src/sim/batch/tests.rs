@@ -8,7 +8,7 @@ use crate::model::{
     Angles, Dynamics, FittedEffect, InputScaling, LastLayer, Library, MlpSettings, MlpWeights,
     ResidualOn, with_residual,
 };
-use crate::sim::{Commands, Environment, Hold, Integrator, Objective, RK4, Simulator};
+use crate::sim::{Environment, Integrator, Objective};
 
 const STEP_S: f64 = 0.02;
 const STEPS: usize = 12;
@@ -33,44 +33,95 @@ fn network(joints: usize, angles: Angles, on: ResidualOn) -> MlpWeights {
     MlpWeights::new(joints, &settings, scaling, LastLayer::Random, &mut rng)
 }
 
+/// The objective and rollouts of a model for it.
+fn rollouts(
+    equations: &Dynamics,
+    networks: &[MlpWeights],
+    reward: &str,
+    integrator: Integrator,
+) -> (Objective, Rollouts) {
+    let objective = Objective::new(reward, equations.joints).unwrap();
+    let program = objective.program();
+    let rollouts = Rollouts::new(equations, networks, program, integrator, STEP_S);
+    (objective, rollouts)
+}
+
+/// The returns of one block of `rollouts`.
+fn returns(
+    rollouts: &Rollouts,
+    start: &[f64],
+    begin_s: f32,
+    carried: &[f32],
+    inputs: &[Rows],
+) -> Rows {
+    let start: Vec<f32> = start.iter().map(|x| *x as f32).collect();
+    let mut returns = Rows::splat(f32::NAN);
+    rollouts
+        .block()
+        .returns(&start, begin_s, carried, inputs, &mut returns);
+    returns
+}
+
+/// The return of one sequence in f64. The oldest of the torques `past` was held for ever before.
+fn exact(
+    (model, integrator): (&Dynamics, Integrator),
+    objective: &Objective,
+    start: &[f64],
+    begin_s: f64,
+    past: &[Vec<f64>],
+    inputs: &[Vec<f64>],
+) -> f64 {
+    let mut rig = Environment::new(model, integrator, STEP_S);
+    // The memory of the filters here is shorter.
+    let oldest = past.iter().take(1).cycle().take(200);
+    let before: Vec<&Vec<f64>> = oldest.chain(past).collect();
+    for (step, tau) in before.iter().enumerate() {
+        let ago = before.len() - step;
+        rig.step(&mut start.to_vec(), tau, begin_s - STEP_S * ago as f64);
+    }
+    let (mut state, mut sum) = (start.to_vec(), 0.0);
+    for (step, tau) in inputs.iter().enumerate() {
+        let time_s = begin_s + STEP_S * step as f64;
+        rig.step(&mut state, tau, time_s);
+        sum += objective.value(&state, tau, time_s + STEP_S);
+    }
+    sum
+}
+
+/// Where the rollouts of a system with `joints` joints start: positions, then velocities.
+fn start(joints: usize) -> Vec<f64> {
+    (0..2 * joints)
+        .map(|k| f64::from(0.4 - 0.3 * k as f32))
+        .collect()
+}
+
 /// The returns of one block from the engine, and computed one by one in f64.
 fn both(equations: &Dynamics, networks: &[MlpWeights], integrator: Integrator) -> [Vec<f64>; 2] {
     let n = equations.joints;
     let reward = "cos(q1) - 0.1 * tau1^2 + 0.01 * qd1 * t";
-    let objective = Objective::new(reward, n).unwrap();
-    let rollouts = Rollouts::new(equations, networks, objective.program(), integrator, STEP_S);
+    let (objective, rollouts) = rollouts(equations, networks, reward, integrator);
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let inputs: Vec<Rows> = (0..STEPS * n)
         .map(|_| Row(std::array::from_fn(|_| rng.random_range(-3.0..3.0))))
         .collect();
-    let start: Vec<f32> = (0..2 * n).map(|k| 0.4 - 0.3 * k as f32).collect();
-    let mut returns = Rows::splat(f32::NAN);
-    rollouts
-        .block()
-        .returns(&start, 1.5, &[], &inputs, &mut returns);
-
+    let found = returns(&rollouts, &start(n), 1.5, &[], &inputs);
     let whole = networks.iter().fold(equations.clone(), |sum, mlp| {
         with_residual(&sum, mlp).unwrap()
     });
     let exact = |lane: usize| {
-        let mut model = Environment::new(&whole, integrator, STEP_S);
-        let mut state: Vec<f64> = start.iter().copied().map(f64::from).collect();
-        let mut sum = 0.0;
-        for step in 0..STEPS {
-            let tau: Vec<f64> = (0..n)
-                .map(|j| f64::from(inputs[step * n + j][lane]))
-                .collect();
-            let time_s = 1.5 + STEP_S * step as f64;
-            model.step(&mut state, &tau, time_s);
-            let seen = [&state, &tau, &vec![time_s + STEP_S]]
-                .map(|x| x.as_slice())
-                .concat();
-            sum += objective.program().eval(&seen)[0];
-        }
-        sum
+        let of_step = |step: &[Rows]| step.iter().map(|row| f64::from(row[lane])).collect();
+        let inputs: Vec<Vec<f64>> = inputs.chunks(n).map(of_step).collect();
+        exact(
+            (&whole, integrator),
+            &objective,
+            &start(n),
+            1.5,
+            &[],
+            &inputs,
+        )
     };
     [
-        returns.iter().copied().map(f64::from).collect(),
+        found.iter().copied().map(f64::from).collect(),
         (0..W).map(exact).collect(),
     ]
 }
@@ -108,20 +159,11 @@ fn a_block_returns_what_single_rollouts_in_f64_do() {
 #[test]
 fn a_rollout_that_diverges_does_so_alone_and_says_so() {
     let equations = equations("pendulum");
-    let objective = Objective::new("cos(q1) - 1e30 * tau1^2", 1).unwrap();
-    let rollouts = Rollouts::new(
-        &equations,
-        &[],
-        objective.program(),
-        Integrator::default(),
-        STEP_S,
-    );
+    let reward = "cos(q1) - 1e30 * tau1^2";
+    let (_, rollouts) = rollouts(&equations, &[], reward, Integrator::default());
     let mut inputs = vec![Rows::splat(0.5); STEPS];
     inputs[3][7] = 1e30;
-    let mut returns = Rows::splat(0.0);
-    rollouts
-        .block()
-        .returns(&[0.1, 0.0], 0.0, &[], &inputs, &mut returns);
+    let returns = returns(&rollouts, &[0.1, 0.0], 0.0, &[], &inputs);
     for (lane, value) in returns.iter().enumerate() {
         assert_eq!(value.is_finite(), lane != 7, "{lane}: {value}");
     }
@@ -130,20 +172,10 @@ fn a_rollout_that_diverges_does_so_alone_and_says_so() {
 #[test]
 fn a_network_does_not_hide_what_is_not_a_number() {
     let equations = equations("pendulum");
-    let objective = Objective::new("cos(q1)", 1).unwrap();
     let networks = [network(1, Angles::Raw, ResidualOn::Accelerations)];
-    let rollouts = Rollouts::new(
-        &equations,
-        &networks,
-        objective.program(),
-        Integrator::default(),
-        STEP_S,
-    );
-    let mut returns = Rows::splat(0.0);
-    let start = [0.1, f32::NAN];
-    rollouts
-        .block()
-        .returns(&start, 0.0, &[], &[Rows::splat(0.0); STEPS], &mut returns);
+    let (_, rollouts) = rollouts(&equations, &networks, "cos(q1)", Integrator::default());
+    let inputs = [Rows::splat(0.0); STEPS];
+    let returns = returns(&rollouts, &[0.1, f64::NAN], 0.0, &[], &inputs);
     assert!(returns.iter().all(|value| value.is_nan()), "{returns:?}");
 }
 
@@ -165,10 +197,6 @@ fn filtered(name: &str, filters: &[Filter]) -> Dynamics {
     system.with_effects(effects).dynamics()
 }
 
-fn filtered_rollouts(equations: &Dynamics, objective: &Objective) -> Rollouts {
-    Rollouts::new(equations, &[], objective.program(), Integrator::RK4, STEP_S)
-}
-
 #[test]
 fn torques_are_filtered_as_everywhere_else() {
     let cases: [(&str, &[Filter]); 4] = [
@@ -187,8 +215,8 @@ fn torques_are_filtered_as_everywhere_else() {
     for (name, filters) in cases {
         let model = filtered(name, filters);
         let n = model.joints;
-        let objective = Objective::new("cos(q1) - 0.1 * tau1^2", n).unwrap();
-        let rollouts = filtered_rollouts(&model, &objective);
+        let reward = "cos(q1) - 0.1 * tau1^2";
+        let (objective, rollouts) = rollouts(&model, &[], reward, Integrator::RK4);
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let mut draw = |steps: usize| -> Vec<Vec<f64>> {
             let mut step = || (0..n).map(|_| rng.random_range(-3.0..3.0)).collect();
@@ -196,19 +224,13 @@ fn torques_are_filtered_as_everywhere_else() {
         };
         let inputs = draw(STEPS);
         for past in [vec![], draw(1), draw(4), draw(200)] {
-            let start: Vec<f64> = (0..2 * n).map(|k| 0.4 - 0.3 * k as f64).collect();
-            let mut found = Rows::splat(f32::NAN);
-            let rows: Vec<_> = inputs
-                .iter()
-                .flatten()
+            let rows: Vec<_> = (inputs.iter().flatten())
                 .map(|x| Rows::splat(*x as f32))
                 .collect();
-            let begin: Vec<f32> = start.iter().map(|x| *x as f32).collect();
             let carried = rollouts.carried(&past, STEPS);
-            rollouts
-                .block()
-                .returns(&begin, 0.0, &carried, &rows, &mut found);
-            let wanted = filtered_return(&model, &objective, &start, &past, &inputs);
+            let found = returns(&rollouts, &start(n), 0.0, &carried, &rows);
+            let model = (&model, Integrator::RK4);
+            let wanted = exact(model, &objective, &start(n), 0.0, &past, &inputs);
             for found in found.iter() {
                 let off = (f64::from(*found) - wanted).abs();
                 assert!(
@@ -221,48 +243,22 @@ fn torques_are_filtered_as_everywhere_else() {
     }
 }
 
-/// The return of one sequence in f64, with the acting torques from [`Commands`].
-fn filtered_return(
-    model: &Dynamics,
-    objective: &Objective,
-    start: &[f64],
-    past: &[Vec<f64>],
-    inputs: &[Vec<f64>],
-) -> f64 {
-    let at_rest = vec![0.0; model.joints];
-    let past = if past.is_empty() { &[at_rest] } else { past };
-    let rows = [past, inputs].concat();
-    let time: Vec<f64> = (0..=rows.len())
-        .map(|row| STEP_S * (row as f64 - past.len() as f64))
-        .collect();
-    let tau: Vec<Vec<f64>> = (0..model.joints)
-        .map(|joint| rows.iter().map(|tau| tau[joint]).collect())
-        .collect();
-    let commands = Commands::new(model, &time[..rows.len()], &tau);
-    let mut simulator = Simulator::new(model, RK4);
-    simulator.put(start);
-    let mut sum = 0.0;
-    for row in past.len()..rows.len() {
-        let held: Vec<_> = rows[row].iter().map(|x| Row([*x])).collect();
-        let [from, to] = [row, row + 1].map(|row| Row([time[row]]));
-        simulator.advance(&Hold::lasting([&commands], &held, from, STEP_S, 1));
-        let seen = [simulator.state.as_slice(), &held, &[to]].concat();
-        let seen: Vec<f64> = seen.iter().map(|row| row[0]).collect();
-        sum += objective.program().eval(&seen)[0];
-    }
-    sum
-}
-
 #[test]
 fn what_lies_beyond_the_memory_does_not_matter() {
-    let objective = Objective::new("cos(q1)", 1).unwrap();
-    let memory =
-        |filters: &[Filter]| filtered_rollouts(&filtered("pendulum", filters), &objective).memory();
+    let of = |filters: &[Filter]| {
+        rollouts(
+            &filtered("pendulum", filters),
+            &[],
+            "cos(q1)",
+            Integrator::RK4,
+        )
+        .1
+    };
+    let memory = |filters: &[Filter]| of(filters).memory();
     assert_eq!(memory(&[]), 0);
     assert_eq!(memory(&[("actuator_delay", 0, 0.0)]), 0);
     assert_eq!(memory(&[("actuator_delay", 0, 1.5 * STEP_S)]), 2);
-    let lag = filtered("pendulum", &[("actuator_lag", 0, 0.05)]);
-    let rollouts = filtered_rollouts(&lag, &objective);
+    let rollouts = of(&[("actuator_lag", 0, 0.05)]);
     let past: Vec<_> = (0..100).map(|k| vec![f64::from(k).sin()]).collect();
     let recent = &past[past.len() - rollouts.memory()..];
     assert_eq!(
@@ -275,7 +271,6 @@ fn what_lies_beyond_the_memory_does_not_matter() {
         rollouts.carried(forgotten, STEPS)
     );
     // However slow, a filter passes a constant torque in full.
-    let slow = filtered("pendulum", &[("actuator_lag", 0, 1000.0)]);
-    let carried = filtered_rollouts(&slow, &objective).carried(&[vec![1.0]], 1);
+    let carried = of(&[("actuator_lag", 0, 1000.0)]).carried(&[vec![1.0]], 1);
     assert!((carried[0] - 1.0).abs() < 1e-4, "{carried:?}");
 }
