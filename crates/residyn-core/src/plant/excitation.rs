@@ -31,20 +31,13 @@ impl Excitation {
                     #[allow(clippy::cast_precision_loss)]
                     let place = (k as f64 + rng.random::<f64>()) / count;
                     let frequency = low * (high / low).powf(place);
-                    [
-                        amplitude / count.sqrt(),
-                        TAU * frequency,
-                        TAU * rng.random::<f64>(),
-                    ]
+                    let phase = TAU * rng.random::<f64>();
+                    [amplitude / count.sqrt(), TAU * frequency, phase]
                 })
                 .collect()
         };
-        Tones(
-            self.amplitude
-                .iter()
-                .map(|amplitude| tones(*amplitude))
-                .collect(),
-        )
+        let amplitudes = self.amplitude.iter();
+        Tones(amplitudes.map(|amplitude| tones(*amplitude)).collect())
     }
 }
 

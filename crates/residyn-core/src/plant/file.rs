@@ -196,12 +196,9 @@ impl Plant {
 
     fn check(&self) -> Result<(), String> {
         let n = self.system.joints;
-        let one_each = |what: &str, found: usize, wanted: usize| {
-            if found == wanted {
-                Ok(())
-            } else {
-                Err(format!("`{what}` needs {wanted} numbers, found {found}"))
-            }
+        let one_each = |what: &str, found: usize, wanted: usize| match found == wanted {
+            true => Ok(()),
+            false => Err(format!("`{what}` needs {wanted} numbers, found {found}")),
         };
         one_each("excitation.amplitude", self.excitation.amplitude.len(), n)?;
         one_each("recording.start", self.recording.start.len(), 2 * n)?;
@@ -217,10 +214,8 @@ impl Plant {
         }
         check_readings("sensor", noise)?;
         check_readings("excitation.band_hz", [high])?;
-        check_readings(
-            "excitation.amplitude",
-            self.excitation.amplitude.iter().copied(),
-        )?;
+        let amplitude = self.excitation.amplitude.iter().copied();
+        check_readings("excitation.amplitude", amplitude)?;
         check_readings("recording.start", self.recording.start.iter().copied())?;
         let counts = [
             ("excitation.tones", self.excitation.tones, TONES),
@@ -259,14 +254,13 @@ impl Plant {
     /// # Errors
     /// Unknown parameter, with a similar known one.
     pub fn set_parameters(&mut self, values: &BTreeMap<String, f64>) -> Result<(), PlantError> {
-        let known = &self.system.parameters;
+        let known = self.system.parameters.iter().map(|p| p.name.as_str());
         for (name, value) in values {
-            let Some(k) = known.iter().position(|p| p.name == *name) else {
-                let near = suggestion(name, known.iter().map(|p| p.name.as_str()));
+            let Some(k) = known.clone().position(|known| known == name) else {
                 return Err(PlantError::Parameter {
                     system: self.system.name.clone(),
                     name: name.clone(),
-                    near,
+                    near: suggestion(name, known),
                 });
             };
             self.parameters[k] = *value;
@@ -305,28 +299,22 @@ impl Plant {
                 found: joint,
             });
         }
-        let mut own: Vec<(f64, Option<[f64; 2]>)> = effect
-            .parameters
-            .iter()
-            .map(|p| (p.typical, None))
-            .collect();
+        let mut new = FittedEffect::absent(effect, joint);
+        for (value, parameter) in new.values.iter_mut().zip(&effect.parameters) {
+            value.0 = parameter.typical;
+        }
+        let known: Vec<&str> = effect.parameters.iter().map(|p| p.name.as_str()).collect();
         for (key, value) in values {
-            let Some(k) = effect.parameters.iter().position(|p| p.name == *key) else {
-                let near = suggestion(key, effect.names());
-                let known: Vec<&str> = effect.names().collect();
+            let Some(k) = known.iter().position(|known| known == key) else {
                 return Err(PlantError::EffectParameter {
                     effect: name.to_owned(),
                     name: key.clone(),
-                    near,
+                    near: suggestion(key, known.iter().copied()),
                     known: known.join(", "),
                 });
             };
-            own[k].0 = *value;
+            new.values[k].0 = *value;
         }
-        let new = FittedEffect {
-            values: own,
-            ..FittedEffect::absent(effect, joint)
-        };
         self.system.check_effect(&new, &self.effects)?;
         self.effects.push(new);
         Ok(())

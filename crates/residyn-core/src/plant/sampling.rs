@@ -67,13 +67,9 @@ impl Plant {
             ));
         }
         let mut environment = Environment::new(&dynamics, sampling.integrator, sampling.step_s);
-        let draws = sampling.draws(rng);
-        draws
-            .into_iter()
-            .map(|draw| {
-                let run = sampling.run(draw, &mut environment);
-                run.map_err(|time_s| self.diverged(time_s))
-            })
+        let mut run = |draw: Draw| sampling.run(draw, &mut environment);
+        (sampling.draws(rng).into_iter())
+            .map(|draw| run(draw).map_err(|time_s| self.diverged(time_s)))
             .collect()
     }
 }

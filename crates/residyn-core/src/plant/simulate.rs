@@ -46,13 +46,14 @@ impl Plant {
         #[allow(clippy::cast_precision_loss)] // a few thousand rows
         let times: Vec<f64> = (0..rows).map(|row| row as f64 * dt).collect();
         let driving: Vec<Vec<f64>> = times.iter().map(|time| tones.at(*time)).collect();
-        let driving_joints = by_joint(&driving, n);
-        let commands = [&Commands::new(&dynamics, &times, &driving_joints)];
+        let of_joint = |joint: usize| driving.iter().map(|tau| tau[joint]).collect();
+        let by_joint: Vec<Vec<f64>> = (0..n).map(of_joint).collect();
+        let commands = [&Commands::new(&dynamics, &times, &by_joint)];
         let mut simulator = Simulator::new(&dynamics, RK4);
         simulator.put(&self.as_read(&self.recording.start));
-        for (row, (&time, tau)) in times.iter().zip(driving).enumerate() {
+        for (row, (&time, tau)) in times.iter().zip(&driving).enumerate() {
             let [angles, _] = simulator.shown(commands, [row]);
-            self.measure(&mut log, time, angles, &tau, rng);
+            self.measure(&mut log, time, angles, tau, rng);
             let held: Vec<Row<f64, 1>> = tau.iter().map(|tau| Row([*tau])).collect();
             simulator.advance(&Hold::lasting(commands, &held, Row([time]), dt, substeps));
             if !simulator.state.iter().all(|value| is_reading(value[0])) {
@@ -97,10 +98,9 @@ impl Plant {
         for j in 0..tau.len() {
             let step = self.sensor.position_step;
             let read = angles[j][0] + noise.sample(rng);
-            let q = if step > 0.0 {
-                (read / step).round() * step
-            } else {
-                read
+            let q = match step > 0.0 {
+                true => (read / step).round() * step,
+                false => read,
             };
             let qd = match (previous, log.q[j].last()) {
                 (Some(before), Some(last)) => (q - last) / (time - before),
@@ -111,11 +111,4 @@ impl Plant {
             log.tau[j].push(tau[j]);
         }
     }
-}
-
-/// `[joint][row]` from `[row][joint]`
-fn by_joint(rows: &[Vec<f64>], joints: usize) -> Vec<Vec<f64>> {
-    (0..joints)
-        .map(|j| rows.iter().map(|row| row[j]).collect())
-        .collect()
 }
