@@ -92,15 +92,9 @@ pub fn episode(
 
 impl Stretch {
     fn push(&mut self, rig: &Rig<'_>, measured: &[f64], tau: &[f64]) {
-        let Log {
-            time,
-            q,
-            qd,
-            tau: held,
-            ..
-        } = &mut self.log;
-        time.push(rig.time_s());
-        let channels = q.iter_mut().chain(qd).chain(held);
+        let log = &mut self.log;
+        log.time.push(rig.time_s());
+        let channels = log.q.iter_mut().chain(&mut log.qd).chain(&mut log.tau);
         for (channel, value) in channels.zip(measured.iter().chain(tau)) {
             channel.push(*value);
         }

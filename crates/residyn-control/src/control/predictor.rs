@@ -43,16 +43,12 @@ impl Predictor {
     /// # Panics
     /// When the objective has a different number of joints.
     pub fn rollouts(&self, objective: &Objective, step_s: f64) -> Rollouts {
-        let Self {
-            equations,
-            networks,
-            integrator,
-        } = self;
+        let (equations, objective) = (&self.equations, objective.program());
         Rollouts::new(
             equations,
-            networks,
-            objective.program(),
-            *integrator,
+            &self.networks,
+            objective,
+            self.integrator,
             step_s,
         )
     }

@@ -59,12 +59,8 @@ impl Search for Icem {
         let exponent = self.noise_exponent;
         within("noise_exponent", exponent, 0.0..=10.0, "from 0 to 10")?;
         within("keep", self.keep, 0.0..=1.0, "from 0 to 1")?;
-        within(
-            "momentum",
-            self.momentum,
-            0.0..1.0,
-            "at least 0 and below 1",
-        )
+        let below_one = "at least 0 and below 1";
+        within("momentum", self.momentum, 0.0..1.0, below_one)
     }
 
     fn noise(&self, steps: usize, inputs: usize) -> Noise {

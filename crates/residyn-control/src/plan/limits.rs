@@ -24,12 +24,8 @@ pub(super) fn check_elite(elite: usize, population: usize) -> Result<(), Setting
 
 /// Refuse a count that is zero or above `most`.
 pub(super) fn whole(key: &'static str, value: usize, most: usize) -> Result<(), SettingsError> {
-    within(
-        key,
-        value,
-        1..=most,
-        &format!("a whole number from 1 to {most}"),
-    )
+    let remedy = format!("a whole number from 1 to {most}");
+    within(key, value, 1..=most, &remedy)
 }
 
 /// Refuse the value of `key` outside of `range`, which `remedy` puts into words.

@@ -32,13 +32,9 @@ impl Default for Mppi {
 impl Search for Mppi {
     fn check(&self, _: usize) -> Result<(), SettingsError> {
         let above_zero = "above 0 and at most 10";
-        for (key, value) in [
-            ("temperature", self.temperature),
-            ("deviation", self.deviation),
-        ] {
-            within(key, value, f64::MIN_POSITIVE..=10.0, above_zero)?;
-        }
-        Ok(())
+        let check = |key, value| within(key, value, f64::MIN_POSITIVE..=10.0, above_zero);
+        check("temperature", self.temperature)?;
+        check("deviation", self.deviation)
     }
 
     fn deviation(&self) -> f64 {

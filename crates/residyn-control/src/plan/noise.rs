@@ -71,22 +71,16 @@ impl WithSimd for Mix<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Colour {
-            steps,
-            inputs,
-            mixing,
-            white,
-            sequence,
-        } = self.colour;
+        let colour = self.colour;
         let product = Product {
-            weight: mixing,
+            weight: &colour.mixing,
             bias: &[],
             finish: Finish::Plain,
         };
-        for (input, white) in white.chunks(*steps).enumerate() {
-            product.run(simd, white, sequence);
-            let rows = self.rows[input..].iter_mut().step_by(*inputs);
-            for (row, number) in rows.zip(&*sequence) {
+        for (input, white) in colour.white.chunks(colour.steps).enumerate() {
+            product.run(simd, white, &mut colour.sequence);
+            let rows = self.rows[input..].iter_mut().step_by(colour.inputs);
+            for (row, number) in rows.zip(&colour.sequence) {
                 *row = *number;
             }
         }
@@ -106,11 +100,8 @@ fn mixing(steps: usize, exponent: f64) -> Vec<f32> {
         // The constant and the highest frequency have no sine.
         let alone = (2 * frequency(number)).is_multiple_of(steps);
         let energy = if alone { 1.0 } else { 2.0 };
-        let quarter = if number > 0 && number.is_multiple_of(2) {
-            0.25
-        } else {
-            0.0
-        };
+        let is_sine = number > 0 && number.is_multiple_of(2);
+        let quarter = if is_sine { 0.25 } else { 0.0 };
         let wave = (TAU * (turns - quarter)).cos();
         (amplitude(number) * (energy / power).sqrt() * wave) as f32
     };

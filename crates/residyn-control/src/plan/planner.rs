@@ -76,13 +76,8 @@ impl<E: Evaluate> Planner<E> {
         rng: &ChaCha8Rng,
     ) -> Self {
         settings.check().expect("settings that have been checked");
-        Self::by(
-            settings.method.search(),
-            settings.size(),
-            bounds,
-            evaluate,
-            rng,
-        )
+        let (search, size) = (settings.method.search(), settings.size());
+        Self::by(search, size, bounds, evaluate, rng)
     }
 
     /// The same by any method.
@@ -97,16 +92,9 @@ impl<E: Evaluate> Planner<E> {
         rng: &ChaCha8Rng,
     ) -> Self {
         assert!(!bounds.is_empty(), "something to search");
-        assert!(
-            bounds.iter().all(|[low, high]| low < high),
-            "ranges that are not empty"
-        );
-        let Size {
-            population,
-            horizon,
-            ..
-        } = size;
-        let noise = search.noise(horizon, bounds.len());
+        let are_ranges = bounds.iter().all(|[low, high]| low < high);
+        assert!(are_ranges, "ranges that are not empty");
+        let noise = search.noise(size.horizon, bounds.len());
         let block = |index: usize| {
             let mut rng = rng.clone();
             rng.set_stream(index as u64);
@@ -115,7 +103,7 @@ impl<E: Evaluate> Planner<E> {
                 rng,
                 noise: noise.clone(),
                 arch: Arch::new(),
-                inputs: vec![Rows::splat(0.0); horizon * bounds.len()],
+                inputs: vec![Rows::splat(0.0); size.horizon * bounds.len()],
                 returns: Rows::splat(0.0),
             }
         };
@@ -123,8 +111,8 @@ impl<E: Evaluate> Planner<E> {
             search,
             size,
             start: RwLock::new(None),
-            proposal: RwLock::new(Proposal::new(bounds, horizon)),
-            blocks: (0..population.div_ceil(W))
+            proposal: RwLock::new(Proposal::new(bounds, size.horizon)),
+            blocks: (0..size.population.div_ceil(W))
                 .map(|index| Mutex::new(block(index)))
                 .collect(),
             pool: WorkerPool::new(),
@@ -150,21 +138,17 @@ impl<E: Evaluate> Planner<E> {
 
     /// Search for the best inputs from `start`.
     pub fn plan(&self, start: E::Start) -> Plan {
-        let Size {
-            population,
-            iterations,
-            horizon,
-        } = self.size;
+        let horizon = self.size.horizon;
         let start = lock(&self.blocks[0]).evaluate.prepare(start, horizon);
         *write(&self.start) = Some(start);
         write(&self.proposal).begin(self.search.deviation());
         let (mut best, mut diverged) = (f32::NEG_INFINITY, 0);
-        for _ in 0..iterations {
+        for _ in 0..self.size.iterations {
             let tasks = self.blocks.len();
             self.pool.run(tasks, &|index| self.draw_and_evaluate(index));
             let blocks: Vec<_> = self.blocks.iter().map(lock).collect();
             let evaluated = blocks.iter().map(|b| (b.inputs.as_slice(), &b.returns));
-            let population = Population::new(evaluated, population);
+            let population = Population::new(evaluated, self.size.population);
             let mut proposal = write(&self.proposal);
             self.search.learn(&population, &mut proposal);
             best = population.best();
