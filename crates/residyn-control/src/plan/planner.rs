@@ -162,22 +162,13 @@ impl<E: Evaluate> Planner<E> {
     }
 
     fn draw_and_evaluate(&self, index: usize) {
-        let mut block = lock(&self.blocks[index]);
-        block.draw(&read(&self.proposal), index);
-        block.evaluate(read(&self.start).as_ref().expect("a search has a start"));
-    }
-}
-
-impl<E: Evaluate> Candidates<E> {
-    /// Draw the candidates of the block with this index.
-    fn draw(&mut self, from: &Proposal, index: usize) {
-        self.noise.fill(self.arch, &mut self.rng, &mut self.inputs);
-        from.place(self.arch, index, &mut self.inputs);
-    }
-
-    fn evaluate(&mut self, start: &E::Prepared) {
-        self.evaluate
-            .returns(start, &self.inputs, &mut self.returns);
+        let block = &mut *lock(&self.blocks[index]);
+        let (arch, inputs) = (block.arch, &mut block.inputs);
+        block.noise.fill(arch, &mut block.rng, inputs);
+        read(&self.proposal).place(arch, index, inputs);
+        let start = read(&self.start);
+        let start = start.as_ref().expect("a search has a start");
+        block.evaluate.returns(start, inputs, &mut block.returns);
     }
 }
 

@@ -139,9 +139,7 @@ impl Balance {
         }
         for lanes in &self.at {
             let of = |value: &dyn Fn(usize, usize) -> f64| {
-                Row(std::array::from_fn(|lane| {
-                    lanes[lane].map_or(0.0, |at| value(self.logs[lane], at))
-                }))
+                Row::from_fn(|lane| lanes[lane].map_or(0.0, |at| value(self.logs[lane], at)))
             };
             let joints = self.weight.len();
             let layout = InputLayout::of(joints);
@@ -219,7 +217,7 @@ impl Balance {
             for (j, ((sums, weight), (_, slopes))) in of_joints.enumerate() {
                 let weight: Lane = Row(lanes.map(|at| at.map_or(0.0, |_| weight / scale)));
                 let out = tape.output(j);
-                let residual = Row(std::array::from_fn(|l| out[l] * weight[l]));
+                let residual = Row::from_fn(|l| out[l] * weight[l]);
                 sums.add(&residual, slopes.map(|output| tape.output(output)), &weight);
             }
         });

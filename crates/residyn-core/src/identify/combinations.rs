@@ -203,7 +203,7 @@ fn identifiable_at_most(columns: &Columns<'_>) -> usize {
     let mut information = DMatrix::<f64>::zeros(columns.places.len(), columns.places.len());
     for _ in 0..ROWS {
         for slot in tape.moving() {
-            *slot = Row(std::array::from_fn(|_| StandardNormal.sample(&mut rng)));
+            *slot = Row::from_fn(|_| StandardNormal.sample(&mut rng));
         }
         tape.run();
         for (places, outputs) in tangent.slopes() {

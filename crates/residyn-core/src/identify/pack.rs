@@ -112,9 +112,7 @@ impl Pack {
     /// The local values of the pack's windows, one row per value.
     fn gather(&self, start_states: &[Vec<f64>]) -> Vec<Lane> {
         let lane_of = |lane: usize| &start_states[self.windows[lane.min(self.windows.len() - 1)]];
-        (0..lane_of(0).len())
-            .map(|k| Row(std::array::from_fn(|lane| lane_of(lane)[k])))
-            .collect()
+        Row::table(lane_of(0).len(), |k, lane| lane_of(lane)[k])
     }
 
     /// Call `set(parameter, lane, value)` for every value that belongs to the log of a single lane.
@@ -226,9 +224,7 @@ impl Pack {
             let (angles, slopes) = stepper.shown(before, self.time[row]);
             for j in 0..n {
                 let weight = Row(self.weight[row][j].map(|w| w / scale));
-                let residual = Row(std::array::from_fn(|l| {
-                    (angles[j][l] - self.q[row][j][l]) * weight[l]
-                }));
+                let residual = Row::from_fn(|l| (angles[j][l] - self.q[row][j][l]) * weight[l]);
                 sums.add(&residual, &slopes[j * columns..][..columns], &weight);
             }
             if row == 0 {
@@ -254,9 +250,7 @@ impl Pack {
         for j in 0..n {
             let mut add = |k: usize, value: &Lane, slopes: &[Lane]| {
                 let (estimate, weight) = (self.start[k], self.start_weight[k]);
-                let residual = Row(std::array::from_fn(|l| {
-                    (value[l] - estimate[l]) * weight[l]
-                }));
+                let residual = Row::from_fn(|l| (value[l] - estimate[l]) * weight[l]);
                 sums.add(&residual, slopes, &weight);
             };
             add(j, &angles[j], &slopes[j * columns..][..columns]);

@@ -84,10 +84,8 @@ impl Sums {
         }
         let waiting = &mut self.waiting;
         let at = waiting.count;
-        waiting.residuals[at] = Row(std::array::from_fn(|l| {
-            losses[l].1 * weight[l] * residual[l]
-        }));
-        waiting.weights[at] = Row(std::array::from_fn(|l| losses[l].1 * weight[l] * weight[l]));
+        waiting.residuals[at] = Row::from_fn(|l| losses[l].1 * weight[l] * residual[l]);
+        waiting.weights[at] = Row::from_fn(|l| losses[l].1 * weight[l] * weight[l]);
         for (column, value) in waiting.sensitivities.iter_mut().zip(sensitivities) {
             column[at] = *value;
         }

@@ -12,6 +12,19 @@ impl<T: Copy, const W: usize> Row<T, W> {
     pub fn splat(value: T) -> Self {
         Self([value; W])
     }
+
+    /// The number of each lane.
+    #[inline(always)]
+    pub fn from_fn(of_lane: impl FnMut(usize) -> T) -> Self {
+        Self(std::array::from_fn(of_lane))
+    }
+
+    /// `count` rows of the numbers `of(row, lane)`.
+    pub fn table(count: usize, of: impl Fn(usize, usize) -> T) -> Vec<Self> {
+        (0..count)
+            .map(|row| Self::from_fn(|lane| of(row, lane)))
+            .collect()
+    }
 }
 
 impl<T: Element, const W: usize> Row<T, W> {

@@ -37,11 +37,10 @@ pub enum Starts {
     Mirrored,
 }
 
-/// The start of one trajectory and its torques, `[step][joint]`.
+/// The start of one trajectory (positions, then velocities) and its torques, `[step][joint]`.
 #[derive(Clone)]
 struct Draw {
-    position: Vec<f64>,
-    velocity: Vec<f64>,
+    state: Vec<f64>,
     torque: Vec<Vec<f64>>,
 }
 
@@ -114,8 +113,9 @@ impl Sampling {
             let draw = match (self.starts, draws.last()) {
                 (Starts::Mirrored, Some(last)) if k % 2 == 1 => last.clone().mirrored(),
                 _ => Draw {
-                    position: uniform(&self.position, rng),
-                    velocity: uniform(&self.velocity, rng),
+                    state: [&self.position, &self.velocity]
+                        .map(|ranges| uniform(ranges, rng))
+                        .concat(),
                     torque: (0..self.length)
                         .map(|_| uniform(&self.torque, rng))
                         .collect(),
@@ -128,8 +128,7 @@ impl Sampling {
 
     /// The error is the time at which the state is no longer finite \[s\].
     fn run(&self, draw: Draw, environment: &mut Environment) -> Result<Trajectory, f64> {
-        let joints = draw.position.len();
-        let mut state = [draw.position, draw.velocity].concat();
+        let mut state = draw.state;
         let mut trajectory = Trajectory {
             time: vec![0.0],
             states: state.clone(),
@@ -147,14 +146,15 @@ impl Sampling {
             trajectory.inputs.extend(tau);
         }
         // No torque acts after the last row.
-        trajectory.inputs.extend(vec![0.0; joints]);
+        trajectory.inputs.extend(vec![0.0; state.len() / 2]);
         Ok(trajectory)
     }
 }
 
 impl Draw {
     fn mirrored(mut self) -> Self {
-        for velocity in &mut self.velocity {
+        let joints = self.state.len() / 2;
+        for velocity in &mut self.state[joints..] {
             *velocity = -*velocity;
         }
         self

@@ -71,15 +71,13 @@ impl<'l> Commands<'l> {
 
     /// The time (s) of one row per lane.
     pub(super) fn times<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Row<f64, W> {
-        Row(std::array::from_fn(|lane| commands[lane].time[rows[lane]]))
+        Row::from_fn(|lane| commands[lane].time[rows[lane]])
     }
 
     /// The commanded torques (`[joint][lane]`) held from one row per lane on.
     pub(super) fn held<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Vec<Row<f64, W>> {
         let held = |joint: usize, lane: usize| commands[lane].tau[joint][rows[lane]];
-        (0..commands[0].joints)
-            .map(|joint| Row(std::array::from_fn(|lane| held(joint, lane))))
-            .collect()
+        Row::table(commands[0].joints, held)
     }
 
     /// The torque (`[joint][lane]`) that acted just before one row per lane.
@@ -91,9 +89,7 @@ impl<'l> Commands<'l> {
                 None => own.tau[joint][row.saturating_sub(1)],
             }
         };
-        (0..commands[0].joints)
-            .map(|joint| Row(std::array::from_fn(|lane| of_lane(joint, lane))))
-            .collect()
+        Row::table(commands[0].joints, of_lane)
     }
 
     /// The log with commanded torques replaced by the mean acting torque from each row to the next.

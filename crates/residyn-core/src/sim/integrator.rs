@@ -52,8 +52,8 @@ impl Integrator {
     /// Substeps of the classical Runge-Kutta method.
     pub const fn fine(substeps: NonZeroU32) -> Self {
         Self {
-            scheme: RK4,
             substeps,
+            ..Self::RK4
         }
     }
 

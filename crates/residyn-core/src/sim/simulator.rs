@@ -64,7 +64,7 @@ impl<'a, const W: usize> Hold<'a, W> {
 }
 
 fn difference<const W: usize>(from: &Row<f64, W>, to: &Row<f64, W>) -> Row<f64, W> {
-    Row(std::array::from_fn(|lane| to[lane] - from[lane]))
+    Row::from_fn(|lane| to[lane] - from[lane])
 }
 
 impl<const W: usize> Simulator<W> {

@@ -102,7 +102,7 @@ fn both(equations: &Dynamics, networks: &[MlpWeights], integrator: Integrator) -
     let (objective, rollouts) = rollouts(equations, networks, reward, integrator);
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let inputs: Vec<Rows> = (0..STEPS * n)
-        .map(|_| Row(std::array::from_fn(|_| rng.random_range(-3.0..3.0))))
+        .map(|_| Row::from_fn(|_| rng.random_range(-3.0..3.0)))
         .collect();
     let found = returns(&rollouts, &start(n), 1.5, &[], &inputs);
     let whole = networks.iter().fold(equations.clone(), |sum, mlp| {

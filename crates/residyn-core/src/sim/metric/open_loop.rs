@@ -199,9 +199,8 @@ impl<'l> Replay<'l> {
     /// The states (`[2n][lane]`) at the windows' starts; empty lanes repeat the last.
     fn starts(&self, pack: &[Window]) -> Vec<Row<f64, LANES>> {
         let starts: Vec<Vec<f64>> = pack.iter().map(|window| self.start(window)).collect();
-        (0..self.model.dynamics.states())
-            .map(|k| Row(std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k])))
-            .collect()
+        let of_lane = |k: usize, lane: usize| starts[lane.min(pack.len() - 1)][k];
+        Row::table(self.model.dynamics.states(), of_lane)
     }
 
     /// The state at the window's start.
