@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::Task;
 use crate::plan::{Planner, Start};
-use residyn_core::sim::batch::Block;
+use residyn_core::sim::batch::{Block, Rollouts};
 
 /// Decides the torque of each step.
 pub trait Policy {
@@ -28,26 +28,26 @@ pub struct LostPlan {
 /// initialises the search for the next.
 pub struct Controller<'p, 'r> {
     planner: &'p Planner<Block<'r>>,
+    rollouts: &'r Rollouts,
     replan: usize,
     plan: VecDeque<Vec<f64>>,
     /// The last torques, as many as the model's delays need.
     past: VecDeque<Vec<f64>>,
-    memory: usize,
     decisions: usize,
     diverged: usize,
     lost: Vec<f64>,
 }
 
 impl<'p, 'r> Controller<'p, 'r> {
-    /// Executes `replan` steps of each plan; `memory` is the number of past torques that the model needs.
-    pub fn new(planner: &'p Planner<Block<'r>>, replan: usize, memory: usize) -> Self {
+    /// Executes `replan` steps of each plan; the planner's blocks are of these rollouts.
+    pub fn new(planner: &'p Planner<Block<'r>>, rollouts: &'r Rollouts, replan: usize) -> Self {
         planner.forget();
         Self {
             planner,
+            rollouts,
             replan,
             plan: VecDeque::new(),
             past: VecDeque::new(),
-            memory,
             decisions: 0,
             diverged: 0,
             lost: Vec::new(),
@@ -82,8 +82,9 @@ impl<'p, 'r> Controller<'p, 'r> {
         if self.decisions > 0 {
             self.planner.shift(self.replan);
         }
-        let start = Start::after(measured, time_s, self.past.make_contiguous());
-        let plan = self.planner.plan(start);
+        let past = self.past.make_contiguous();
+        let carried = self.rollouts.carried(past, self.planner.horizon());
+        let plan = self.planner.plan(Start::after(measured, time_s, carried));
         self.plan = plan.inputs.into_iter().take(self.replan).collect();
         self.decisions += 1;
         self.diverged += plan.diverged;
@@ -100,7 +101,7 @@ impl Policy for Controller<'_, '_> {
         }
         let torque = self.plan.pop_front().expect("a plan has steps");
         self.past.push_back(torque.clone());
-        if self.past.len() > self.memory {
+        if self.past.len() > self.rollouts.memory() {
             self.past.pop_front();
         }
         torque

@@ -17,5 +17,5 @@ pub fn with_controller<R>(
 ) -> R {
     let rollouts = predictor.rollouts(&task.objective(), task.step_s);
     let planner = Planner::new(&task.planner, &task.torque, || rollouts.block(), rng);
-    planner.with_workers(|| lead(&mut Controller::new(&planner, replan, rollouts.memory())))
+    planner.with_workers(|| lead(&mut Controller::new(&planner, &rollouts, replan)))
 }

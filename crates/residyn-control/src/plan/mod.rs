@@ -20,8 +20,6 @@
 //! # struct NearHalf;
 //! # impl Evaluate for NearHalf {
 //! #     type Start = ();
-//! #     type Prepared = ();
-//! #     fn prepare(&self, (): (), _: usize) {}
 //! #     fn returns(&mut self, (): &(), inputs: &[Rows], returns: &mut Rows) {
 //! #         for lane in 0..returns.len() {
 //! #             returns[lane] = -inputs.iter().map(|row| (row[lane] - 0.5).abs()).sum::<f32>();
@@ -58,7 +56,7 @@ pub use cem::Cem;
 pub use icem::Icem;
 pub use limits::SettingsError;
 pub use method::Search;
-pub use model::{Prepared, Start};
+pub use model::Start;
 pub use mppi::Mppi;
 pub use noise::Noise;
 pub use planner::{Evaluate, Plan, Planner};

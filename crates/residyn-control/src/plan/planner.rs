@@ -12,17 +12,12 @@ use residyn_core::sim::batch::{Rows, W};
 
 /// Evaluates candidate input sequences. There is one evaluator for each block of candidates.
 pub trait Evaluate: Send {
-    /// Initial condition of a plan.
-    type Start;
-    /// The initial condition with everything that all candidates share.
-    type Prepared: Send + Sync;
-
-    /// Prepare a plan of `steps` steps from `start`.
-    fn prepare(&self, start: Self::Start, steps: usize) -> Self::Prepared;
+    /// Initial condition of a plan, with everything that all candidates share.
+    type Start: Send + Sync;
 
     /// The return of each candidate of a block from `start` under `inputs` (`[step * n + input]`); NaN or infinite if
     /// the rollout diverges.
-    fn returns(&mut self, start: &Self::Prepared, inputs: &[Rows], returns: &mut Rows);
+    fn returns(&mut self, start: &Self::Start, inputs: &[Rows], returns: &mut Rows);
 }
 
 /// A search for the inputs that maximise a return, by the [`Method`](super::Method) of its settings or a [`Search`] of
@@ -36,7 +31,7 @@ pub struct Planner<E: Evaluate> {
     search: Arc<dyn Search>,
     size: Size,
     // Locks, since the workers share all of it with the calling thread. They are never contended.
-    start: RwLock<Option<E::Prepared>>,
+    start: RwLock<Option<E::Start>>,
     proposal: RwLock<Proposal>,
     blocks: Vec<Mutex<Candidates<E>>>,
     pool: WorkerPool,
@@ -136,10 +131,13 @@ impl<E: Evaluate> Planner<E> {
         write(&self.proposal).shift(steps);
     }
 
+    /// Steps of a plan.
+    pub fn horizon(&self) -> usize {
+        self.size.horizon
+    }
+
     /// Search for the best inputs from `start`.
     pub fn plan(&self, start: E::Start) -> Plan {
-        let horizon = self.size.horizon;
-        let start = lock(&self.blocks[0]).evaluate.prepare(start, horizon);
         *write(&self.start) = Some(start);
         write(&self.proposal).begin(self.search.deviation());
         let (mut best, mut diverged) = (f32::NEG_INFINITY, 0);

@@ -19,11 +19,6 @@ struct Near(f32);
 
 impl Evaluate for Near {
     type Start = f32;
-    type Prepared = f32;
-
-    fn prepare(&self, goal: f32, _: usize) -> f32 {
-        goal
-    }
 
     fn returns(&mut self, goal: &f32, inputs: &[Rows], returns: &mut Rows) {
         for lane in 0..W {

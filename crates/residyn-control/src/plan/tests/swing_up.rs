@@ -34,7 +34,8 @@ fn swung_up(
     // Nothing was commanded before.
     let mut past = vec![vec![0.0]];
     for begin in (0..500).step_by(replan as usize) {
-        let plan = search.plan(Start::after(&state, 0.02 * f64::from(begin), &past));
+        let carried = rollouts.carried(&past, settings.horizon);
+        let plan = search.plan(Start::after(&state, 0.02 * f64::from(begin), carried));
         search.shift(replan as usize);
         for (step, tau) in (begin..begin + replan).zip(plan.inputs) {
             rig.step(&mut state, &tau, 0.02 * f64::from(step));

@@ -154,11 +154,6 @@ fn whole(equations: &Dynamics, networks: &[MlpWeights], objective: &Program) -> 
 }
 
 impl Block<'_> {
-    /// The rollouts that this block belongs to.
-    pub fn rollouts(&self) -> &Rollouts {
-        self.rollouts
-    }
-
     /// The sum of rewards of each rollout from `start` (positions, then velocities) at `time_s` under `inputs`
     /// (`[step * n + joint]`), each held for a step; `carried` is what earlier torques add to the acting ones, see
     /// [`Rollouts::carried`]. NaN or infinite if a rollout diverges.
