@@ -193,7 +193,6 @@ impl Evidence {
 
     /// What is missing for the effect to be established.
     fn lack(&self, trials: usize, settings: &EstablishSettings) -> Option<String> {
-        #[allow(clippy::cast_precision_loss)] // few trials
         let level = settings.false_alarm / trials.max(1) as f64;
         let p = self.p(settings);
         let significant = self.p_alone() < level

@@ -72,7 +72,6 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         .iter()
         .map(|part| inverse(&(&all - &part.hessian)).0 * &part.gradient)
         .collect();
-    #[allow(clippy::cast_precision_loss)] // few blocks
     let share = 1.0 / count.max(1) as f64;
     let mean = steps
         .iter()
@@ -103,7 +102,6 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
 fn excess(fit: &Fit, covariance: &DMatrix<f64>) -> f64 {
     let bodies = &fit.bodies.hessian;
     let of_bodies = (0..bodies.nrows()).filter(|i| bodies[(*i, *i)] > 0.0);
-    #[allow(clippy::cast_precision_loss)] // a few tens
     let message = of_bodies.count() as f64 - (covariance * bodies).trace();
     (2.0 * fit.bodies.cost / message.max(1.0)).max(1.0)
 }
@@ -195,7 +193,6 @@ impl Uncertainty {
     }
 
     fn student(&self, i: usize) -> StudentsT {
-        #[allow(clippy::cast_precision_loss)] // few blocks
         let freedom = (self.blocks_of[i] as f64 - 1.0).max(1.0);
         StudentsT::new(0.0, 1.0, freedom).expect("freedom is at least one")
     }

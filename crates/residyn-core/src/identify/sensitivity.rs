@@ -498,7 +498,6 @@ impl WithSimd for Advance<'_, '_> {
     fn with_simd<S: Simd>(mut self, simd: S) {
         let n = self.stepper.tangent.joints;
         let layout = InputLayout::of(n);
-        #[allow(clippy::cast_precision_loss)] // few substeps
         let h = Row(self.length.map(|length| length / self.substeps as f64));
         for part in 0..self.substeps {
             let (tau, slopes) = self.stepper.torque.part(n, part);

@@ -204,7 +204,6 @@ impl<'l> Shooting<'l> {
 
     /// The number of residuals that say as much as the declared values do: residuals are correlated, and a few windows
     /// overrule the declared values. In a motion the joints depend on each other; joint torques err independently.
-    #[allow(clippy::cast_precision_loss)] // a few thousand
     fn residuals_of_a_window(&self) -> f64 {
         let residuals = match &self.measure {
             Measure::Motion(_) => {

@@ -51,7 +51,6 @@ pub(super) fn detection_limits(
     let baseline = Baseline::new(problem, accepted)?;
     let all = candidates(problem, &accepted.model.effects);
     let trials: usize = all.iter().map(|candidate| starts(candidate).len()).sum();
-    #[allow(clippy::cast_precision_loss)] // few trials
     let level = problem.settings.establish.false_alarm / trials.max(1) as f64;
     Ok(all
         .into_iter()
@@ -203,7 +202,6 @@ fn own_information(fit: &Fit, least: f64) -> Option<f64> {
 
 /// Standard deviations from zero at which one of `switches` switches is significant at level `p`: the threshold of
 /// Hotelling's test. `None` for too few blocks.
-#[allow(clippy::cast_precision_loss)] // few blocks
 fn critical(p: f64, switches: usize, blocks: usize) -> Option<f64> {
     let (q, freedom) = (switches as f64, blocks as f64 - switches as f64);
     let law = FisherSnedecor::new(q, freedom).ok()?;

@@ -54,7 +54,6 @@ impl Calibration {
     }
 
     /// Share of simulations in which something was named.
-    #[allow(clippy::cast_precision_loss)] // few runs
     pub fn rate(&self) -> f64 {
         self.alarms() as f64 / self.named.len().max(1) as f64
     }

@@ -88,7 +88,6 @@ impl ForceSample {
     /// The sample of one block of a log, with these torques and the force found there.
     fn over(window: &Window, log: &Log, tau: &[Vec<f64>], force: &[f64]) -> Self {
         let rows = window.first..=window.last;
-        #[allow(clippy::cast_precision_loss)] // few rows
         let count = window.rows() as f64;
         let mean = |column: &Vec<f64>| rows.clone().map(|row| column[row]).sum::<f64>() / count;
         let span = log.time[window.last] - log.time[window.first];

@@ -251,10 +251,8 @@ fn sensors(problem: &Problem<'_>) -> Vec<Vec<[f64; 2]>> {
 
 /// The slowest waves of the discrete cosine transform over the rows, at most half of all.
 fn waves(rows: usize, slow: usize) -> DMatrix<f64> {
-    #[allow(clippy::cast_precision_loss)] // few rows
     let count = rows as f64;
     DMatrix::from_fn(rows, (slow + 1).min(rows / 2), |row, wave| {
-        #[allow(clippy::cast_precision_loss)]
         let phase = PI * wave as f64 * (row as f64 + 0.5) / count;
         phase.cos() * ((if wave == 0 { 1.0 } else { 2.0 }) / count).sqrt()
     })

@@ -156,7 +156,6 @@ impl Sum {
 
 /// Three significant digits, without an exponent.
 fn digits(value: f64) -> String {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 0 and 12
     let places = (2.0 - value.abs().max(1e-10).log10().floor()).clamp(0.0, 12.0) as usize;
     format!("{value:.places$}")
 }

@@ -32,7 +32,6 @@ impl ResidualForce {
     }
 
     /// Root mean square over blocks and joints, with outliers limited to three times the median, in N m (or N).
-    #[allow(clippy::cast_precision_loss)] // few blocks
     pub fn norm(&self) -> f64 {
         let forces = self.samples.iter().flat_map(|sample| &sample.force);
         let squares: Vec<f64> = forces.map(|force| force * force).collect();

@@ -97,7 +97,6 @@ pub fn unexplained(
         .into_par_iter()
         .filter_map(|probe| ask(problem, after, probe, &losses))
         .collect();
-    #[allow(clippy::cast_precision_loss)] // few probes
     let asked = probed.len().max(1) as f64;
     let seen = probed
         .iter()
@@ -141,7 +140,6 @@ fn place(problem: &Problem<'_>, omnibus: &Omnibus, probed: &[Probed]) -> (String
         unlocated_share,
         ..
     } = problem.settings.diagnostics;
-    #[allow(clippy::cast_precision_loss)] // few probes
     let level = 0.5 * significance / probed.len().max(1) as f64;
     let (joint, share) = omnibus.most();
     let matters = noteworthy_share.max(located_share * share);

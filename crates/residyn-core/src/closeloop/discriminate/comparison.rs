@@ -279,7 +279,6 @@ fn differences(
             .map(|r| r * r)
             .sum::<f64>()
     };
-    #[allow(clippy::cast_precision_loss)] // a few thousand rows
     let rows = (residuals.len() / n).max(1) as f64;
     (0..n)
         .map(|j| (square(j) / rows).sqrt() * shooting.noise[j])
@@ -292,7 +291,6 @@ fn inflation(problem: &Problem<'_>, fitted: &Fitted) -> f64 {
     let size = fitted.fit.columns.len();
     let covariance = uncertainty(&problem.shooting, &fitted.fit).covariance;
     let all = fitted.fit.equations();
-    #[allow(clippy::cast_precision_loss)] // few parameters
     let mean = (covariance * all.hessian).trace() / size.max(1) as f64;
     mean.max(1.0)
 }

@@ -239,7 +239,6 @@ impl MenuItem {
             _ => settings.motion_s,
         };
         let step_s = (log.median_step() / f64::from(self.finer)).max(length_s / settings.most_rows);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand rows
         let rows = (length_s / step_s).round() as usize;
         let (begin, end) = (log.time[window.first], log.time[log.rows() - 1]);
         let mut motion = Motion {
@@ -249,7 +248,6 @@ impl MenuItem {
             tau: Vec::new(),
         };
         for row in 0..=rows {
-            #[allow(clippy::cast_precision_loss)] // a few thousand rows
             let since = row as f64 * step_s;
             let pace = match self.drive {
                 Drive::Logged { pace, .. } => pace,

@@ -43,7 +43,6 @@ pub fn p_value(problem: &Problem<'_>, fitted: &Fitted, k: usize) -> Option<f64> 
 }
 
 /// Hotelling's form of the F test: a quadratic form in estimates whose covariance comes from few blocks.
-#[allow(clippy::cast_precision_loss)] // few blocks
 fn f_test(statistic: f64, restrictions: usize, blocks: usize) -> f64 {
     let (q, freedom) = (restrictions as f64, blocks as f64 - restrictions as f64);
     if freedom < 1.0 {
@@ -59,7 +58,6 @@ fn f_test(statistic: f64, restrictions: usize, blocks: usize) -> f64 {
 
 /// One-sided signed-rank test (Wilcoxon 1945) of the fall in loss over blocks, in its normal
 /// approximation: effects that act in a few fast blocks give falls with tails too heavy for a t-test.
-#[allow(clippy::cast_precision_loss)] // few blocks
 pub fn p_of_gains(before: &[f64], after: &[f64]) -> f64 {
     let mut falls = differences(before, after);
     falls.retain(|fall| *fall != 0.0);

@@ -248,11 +248,6 @@ fn together(
 ) -> Vec<FittedEffect> {
     // Each window's equations with and without its own free values, and those of the blocks.
     let equations = 3 * problem.shooting.windows.len().max(1);
-    #[allow(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss
-    )] // at most the square root of 2^28
     let values = (problem.settings.select.most_numbers as f64 / equations as f64).sqrt() as usize;
     let room = values.saturating_sub(fitted.fit.columns.len());
     let switches = |option: &FittedEffect| {

@@ -46,7 +46,6 @@ impl Additive {
         let total = Sums::total(&parts);
         let coefficients = solve(&total, &penalties)?.solve(&total.right);
         let covariance = jackknife(&total, &parts, &penalties, &coefficients)?;
-        #[allow(clippy::cast_precision_loss)] // few blocks
         let freedom = parts.len() as f64 - 1.0;
         let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
         Some(Self {
@@ -171,7 +170,6 @@ fn smoothness(
 /// Squared second differences of neighbouring coefficients. A small multiple of their squares is added: it regularises
 /// the directions that the data do not determine, and if the penalty is large it removes slopes as well.
 fn penalty(powers: &[i32], rows: usize) -> DMatrix<f64> {
-    #[allow(clippy::cast_precision_loss)] // few samples
     let rows = rows as f64;
     let mut all = DMatrix::zeros(1 + SPLINES * powers.len(), 1 + SPLINES * powers.len());
     for (k, power) in powers.iter().enumerate() {
@@ -216,7 +214,6 @@ fn jackknife(
             .solve(&(&part.right - &part.matrix * coefficients));
         covariance += &step * step.transpose();
     }
-    #[allow(clippy::cast_precision_loss)] // few blocks
     let count = parts.len() as f64;
     Some(covariance * ((count - 1.0) / count))
 }

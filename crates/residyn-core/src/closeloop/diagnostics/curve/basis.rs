@@ -42,7 +42,6 @@ impl Basis {
     }
 
     /// `count` equidistant values over the range of the basis.
-    #[allow(clippy::cast_precision_loss)] // few points
     pub fn points(&self, count: usize) -> impl Iterator<Item = f64> {
         let place = move |point: usize| point as f64 / (count - 1) as f64;
         (0..count).map(move |point| self.low + place(point) * (self.high - self.low))
@@ -60,7 +59,6 @@ impl Basis {
 
 /// The cubic splines at a position from 0 to 1, constant beyond.
 fn splines(place: f64) -> [f64; SPLINES] {
-    #[allow(clippy::cast_precision_loss)] // few splines
     let pieces = (SPLINES - 3) as f64;
     let at = pieces * place.clamp(0.0, 1.0);
     let piece = at.floor().min(pieces - 1.0);
@@ -73,7 +71,6 @@ fn splines(place: f64) -> [f64; SPLINES] {
         u.powi(3),
     ];
     let mut all = [0.0; SPLINES];
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small whole number
     for (spline, part) in all[piece as usize..].iter_mut().zip(parts) {
         *spline = part / 6.0;
     }
