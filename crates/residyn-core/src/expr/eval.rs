@@ -62,6 +62,19 @@ impl Program {
         self.tape_with_held(self.inputs.len())
     }
 
+    /// As [`Program::tape_with_held`], with these values of the held inputs.
+    pub(crate) fn tape_at<T: Element, const W: usize>(
+        &self,
+        held_from: usize,
+        values: impl IntoIterator<Item = T>,
+    ) -> Tape<'_, T, W> {
+        let mut tape = self.tape_with_held(held_from);
+        for (slot, value) in tape.inputs()[held_from..].iter_mut().zip(values) {
+            *slot = Row::splat(value);
+        }
+        tape
+    }
+
     /// As [`Program::tape`] when the inputs from `held_from` on change rarely: steps that depend only on them are
     /// evaluated again only after a call of [`Tape::inputs`]; [`Tape::moving`] gives access to the other inputs.
     pub fn tape_with_held<T: Element, const W: usize>(&self, held_from: usize) -> Tape<'_, T, W> {

@@ -5,7 +5,7 @@ use super::sensitivity::{LANES, Lane, Tangent};
 use super::sums::{Sums, loss};
 use super::values::Values;
 use crate::data::{Joint, Log, Smooth, Smoothing, row_from};
-use crate::expr::Tape;
+use crate::expr::{Program, Tape};
 use crate::lanes::Row;
 use crate::model::{Dynamics, InputLayout};
 use crate::sim::{Commands, Delivered, Point, Window};
@@ -123,23 +123,16 @@ impl Balance {
     /// A program may take the slopes of the torques with respect to filter parameters before its parameters.
     fn over_rows<'t>(
         &self,
-        mut tape: Tape<'t, f64, LANES>,
+        program: &'t Program,
         first_parameter: usize,
         values: &Values,
         (rows, acting): (&[Rows], &Acting),
         mut see: impl FnMut(&[Option<usize>; LANES], &Tape<'t, f64, LANES>),
     ) {
-        for (slot, value) in tape.inputs()[first_parameter..]
-            .iter_mut()
-            .zip(&values.common)
-        {
-            *slot = Row::splat(*value);
-        }
-        for own in &values.own {
-            for lane in (0..LANES).filter(|&lane| self.logs[lane] == own.log) {
-                tape.inputs()[first_parameter + own.parameter][lane] = own.value;
-            }
-        }
+        let mut tape = program.tape_at(first_parameter, values.common.iter().copied());
+        values.by_lane(&self.logs, |parameter, lane, value| {
+            tape.inputs()[first_parameter + parameter][lane] = value;
+        });
         for lanes in &self.at {
             let of = |value: &dyn Fn(usize, usize) -> f64| {
                 Row(std::array::from_fn(|lane| {
@@ -181,8 +174,7 @@ impl Balance {
         let mut all: Vec<(usize, Vec<f64>)> =
             self.windows.iter().map(|&w| (w, Vec::new())).collect();
         let first = dynamics.layout().parameters_of_balance();
-        let tape = dynamics.program.tape_with_held(first);
-        self.over_rows(tape, first, values, data, |lanes, tape| {
+        self.over_rows(&dynamics.program, first, values, data, |lanes, tape| {
             for (lane, (_, residuals)) in all.iter_mut().enumerate() {
                 if lanes[lane].is_some() {
                     let of_joint = |(j, weight): (usize, &f64)| tape.output(j)[lane] * weight;
@@ -217,9 +209,8 @@ impl Balance {
     ) -> Vec<(usize, WindowTerms)> {
         let of_joint = |columns: &Vec<usize>| Sums::new(columns.len());
         let mut sums: Vec<Sums> = tangent.columns_of.iter().map(of_joint).collect();
-        let first = tangent.first_parameter();
-        let tape = tangent.program.tape_with_held(first);
-        self.over_rows(tape, first, values, data, |lanes, tape| {
+        let first = tangent.first_parameter;
+        self.over_rows(&tangent.program, first, values, data, |lanes, tape| {
             let of_joints = sums.iter_mut().zip(&self.weight).zip(tangent.slopes());
             for (j, ((sums, weight), (_, slopes))) in of_joints.enumerate() {
                 let weight: Lane = Row(lanes.map(|at| at.map_or(0.0, |_| weight / scale)));

@@ -9,6 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::declared_body::PARTS;
 use super::intervals::Uncertainty;
+use super::normal_equations::submatrix;
 use super::outcome::Fit;
 use super::sensitivity::{LANES, Local, Tangent};
 use super::values::{Column, Values};
@@ -196,19 +197,13 @@ fn identifiable_at_most(columns: &Columns<'_>) -> usize {
         .map(|i| columns.fit.columns[*i].parameter)
         .collect();
     let tangent = Tangent::new(columns.dynamics, &active, Local::Nothing);
-    let mut tape = tangent.program.tape::<f64, LANES>();
-    let first = tangent.first_parameter();
-    for (slot, value) in tape.inputs()[first..]
-        .iter_mut()
-        .zip(columns.dynamics.values())
-    {
-        *slot = Row::splat(value);
-    }
+    let values = columns.dynamics.values();
+    let mut tape = (tangent.program).tape_at::<f64, LANES>(tangent.first_parameter, values);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     // For all columns: zero for those that belong to no body.
     let mut information = DMatrix::<f64>::zeros(columns.places.len(), columns.places.len());
     for _ in 0..ROWS {
-        for slot in &mut tape.inputs()[..first] {
+        for slot in tape.moving() {
             *slot = Row(std::array::from_fn(|_| StandardNormal.sample(&mut rng)));
         }
         tape.run();
@@ -273,10 +268,8 @@ fn weights(relative: &DMatrix<f64>, identifiable: &[usize]) -> Option<Weights> {
     let others: Vec<usize> = (0..relative.nrows())
         .filter(|i| !identifiable.contains(i))
         .collect();
-    let known = relative
-        .select_rows(identifiable)
-        .select_columns(identifiable);
-    let cross = relative.select_rows(identifiable).select_columns(&others);
+    let known = submatrix(relative, identifiable, identifiable);
+    let cross = submatrix(relative, identifiable, &others);
     Some(Weights {
         of: known.cholesky()?.solve(&cross),
         others,

@@ -1,5 +1,6 @@
 use nalgebra::DMatrix;
 
+use super::normal_equations::submatrix;
 use super::outcome::Fit;
 use super::values::Values;
 use crate::decomposition::eigen;
@@ -126,7 +127,7 @@ fn hold(
     fit: &Fit,
     readiness: impl Fn(usize) -> Option<usize>,
 ) -> (Vec<usize>, usize) {
-    let part = |of: &[usize]| loose_directions(&information.select_rows(of).select_columns(of));
+    let part = |of: &[usize]| loose_directions(&submatrix(information, of, of));
     let mut left: Vec<usize> = (0..fit.columns.len()).collect();
     let mut loose = part(&left);
     let mut hold = Vec::new();

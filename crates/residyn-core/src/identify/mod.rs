@@ -36,7 +36,7 @@ pub use fit::{as_it_stands, fit, fit_below, fit_by, predicted_cost};
 pub use identifiability::{Identifiability, Open, identifiability, open};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, blocks_of_times, uncertainty};
 pub use levenberg_marquardt::LevenbergMarquardt;
-pub use normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
+pub use normal_equations::{Reduced, WindowTerms, submatrix, with_unit_diagonal};
 pub use offsets::{CalibrateError, Offsets, calibrate, calibrate_first};
 pub use outcome::{Fit, FitError, Termination};
 pub use search::{Linearised, Purpose, Search, Step};

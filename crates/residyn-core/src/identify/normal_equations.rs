@@ -157,9 +157,15 @@ pub(super) fn solve_part(
     if free.is_empty() {
         return Some(DVector::zeros(0));
     }
-    let part = matrix.select_rows(free).select_columns(free);
+    let part = submatrix(matrix, free, free);
     let solution = part.cholesky()?.solve(&right.select_rows(free));
     (solution.iter().all(|value| value.is_finite())).then_some(solution)
+}
+
+/// The part of a matrix in these rows and columns.
+pub fn submatrix(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+    let at = |i: usize, j: usize| matrix[(rows[i], columns[j])];
+    DMatrix::from_fn(rows.len(), columns.len(), at)
 }
 
 /// A matrix in units in which its diagonal is one, and the size of each unit; a diagonal that is not positive stays.

@@ -50,6 +50,12 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// Which of the free values are of such a parameter.
+    pub(crate) fn columns_of(&self, is_one: impl Fn(usize) -> bool) -> Vec<usize> {
+        let all = 0..self.columns.len();
+        all.filter(|&i| is_one(self.columns[i].parameter)).collect()
+    }
+
     /// Zero normal equations in the free values.
     pub fn zero_equations(&self) -> WindowTerms {
         WindowTerms::zeros(self.columns.len())

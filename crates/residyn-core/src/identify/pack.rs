@@ -117,15 +117,6 @@ impl Pack {
             .collect()
     }
 
-    /// Call `set(parameter, lane, value)` for every value that belongs to the log of a single lane.
-    fn per_log_values(&self, values: &Values, mut set: impl FnMut(usize, usize, f64)) {
-        for own in &values.own {
-            for lane in (0..LANES).filter(|&lane| self.logs[lane] == own.log) {
-                set(own.parameter, lane, own.value);
-            }
-        }
-    }
-
     /// The hold from `row` to the next. `force` holds the windows' forces, if they have any.
     fn hold<'a>(
         &'a self,
@@ -163,7 +154,7 @@ impl Pack {
         let model = Point::new(dynamics, values.common.as_slice());
         let mut simulator = Simulator::<LANES>::new(&model, RK4);
         simulator.state = state;
-        self.per_log_values(values, |parameter, lane, value| {
+        values.by_lane(&self.logs, |parameter, lane, value| {
             simulator.set_in_lane(parameter, lane, value);
         });
         for row in 0..self.rows() {
@@ -217,7 +208,7 @@ impl Pack {
         let states = self.gather(start_states);
         let mut sums = Sums::new(columns);
         let mut stepper = TangentStepper::new(tangent, &values.common, RK4);
-        self.per_log_values(values, |parameter, lane, value| {
+        values.by_lane(&self.logs, |parameter, lane, value| {
             stepper.set_in_lane(parameter, lane, value);
         });
         stepper.start(&states);

@@ -1,15 +1,16 @@
+use std::collections::HashSet;
 use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::equations::solve;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::data::Joint;
 use crate::identify::{
-    Column, Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, step_within_bounds,
-    with_unit_diagonal,
+    Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, step_within_bounds, submatrix,
 };
-use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect};
+use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect, Model};
 
 /// Every effect of the library on every joint where it can act and is not yet in the model, and every shift of a
 /// parameter that the file declares fixed.
@@ -194,22 +195,16 @@ fn best_by_switches(
     let places: Vec<Range<usize>> = (first..model.effects.len())
         .map(|k| model.place_of(k))
         .collect();
-    let parameters = &starts[0].effect.parameters;
-    let is_switch = |k: &usize| parameters[(k - places[0].start) % parameters.len()].is_switch();
+    let switches = switches(&model);
     let mut active = problem.active(&dynamics);
-    active.retain(|k| *k < places[0].start || is_switch(k));
+    active.retain(|k| *k < places[0].start || switches.contains(k));
     let shooting = &problem.sample.shooting;
     let scale = fitted.fit.scale;
     let fit = as_it_stands(shooting, &dynamics, &active, start_states.to_vec(), scale).ok()?;
     let all = fit.equations_and_prior();
     let cost = |place: &Range<usize>| {
-        let is_own = |column: &Column| {
-            column.parameter < places[0].start || place.contains(&column.parameter)
-        };
-        let own: Vec<usize> = (0..fit.columns.len())
-            .filter(|&i| is_own(&fit.columns[i]))
-            .collect();
-        least_cost(&dynamics, &fit, &all, &own)
+        let own = fit.columns_of(|k| k < places[0].start || place.contains(&k));
+        least_cost(&dynamics, &fit, &all, own)
     };
     let costs = places.iter().map(cost).zip(starts);
     let best = costs.filter_map(|(cost, start)| Some((cost?, start)));
@@ -218,21 +213,26 @@ fn best_by_switches(
 }
 
 /// The minimum of the quadratic cost over some free values; values at a bound that would leave it are held.
-fn least_cost(dynamics: &Dynamics, fit: &Fit, all: &WindowTerms, own: &[usize]) -> Option<f64> {
-    let solve = |free: &[usize]| {
-        let matrix = all.hessian.select_rows(free).select_columns(free);
-        let (mut scaled, unit) = with_unit_diagonal(&matrix);
-        (0..unit.len()).for_each(|i| scaled[(i, i)] += 1e-9);
-        let right = all.gradient.select_rows(free).component_mul(&unit);
-        Some(-scaled.cholesky()?.solve(&right).component_mul(&unit))
+fn least_cost(dynamics: &Dynamics, fit: &Fit, all: &WindowTerms, own: Vec<usize>) -> Option<f64> {
+    let step = |free: &[usize]| {
+        let matrix = submatrix(&all.hessian, free, free);
+        Some(-solve(&matrix, &all.gradient.select_rows(free))?)
     };
     let leaves = |i: usize, step: f64| {
         let parameter = &dynamics.parameters[fit.columns[i].parameter];
         let [low, high] = parameter.bounds;
         parameter.value <= low && step < 0.0 || parameter.value >= high && step > 0.0
     };
-    let (free, step) = step_within_bounds(own.to_vec(), solve, leaves)?;
+    let (free, step) = step_within_bounds(own, step, leaves)?;
     Some(0.5 * all.gradient.select_rows(&free).dot(&step))
+}
+
+/// The parameters of a model, counted among all, that switch one of its effects off at zero.
+pub fn switches(model: &Model) -> HashSet<usize> {
+    let placed = |k: usize| model.place_of(k).zip(&model.effects[k].effect.parameters);
+    let all = (0..model.effects.len()).flat_map(placed);
+    let switches = all.filter(|(_, parameter)| parameter.is_switch());
+    switches.map(|(k, _)| k).collect()
 }
 
 /// Whether some parameter value switches the effect off, so that it can start from absent.

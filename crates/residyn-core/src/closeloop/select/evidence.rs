@@ -1,10 +1,11 @@
 use nalgebra::DVector;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
+use super::candidate::switches;
 use super::trial::differences;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::identify::{squared_distance, uncertainty};
+use crate::identify::{squared_distance, submatrix, uncertainty};
 
 /// Fall of the loss as a share of the loss before.
 pub fn gain(before: &[f64], after: &[f64]) -> f64 {
@@ -14,30 +15,20 @@ pub fn gain(before: &[f64], after: &[f64]) -> f64 {
 /// Probability, by the cluster-robust Wald test, of the fitted values of the k-th effect if it were absent. `None` for
 /// an effect that no parameter value switches off.
 pub fn p_value(problem: &Problem<'_>, fitted: &Fitted, k: usize) -> Option<f64> {
-    let effect = &fitted.model.effects[k].effect;
-    let range = fitted.model.place_of(k);
-    let is_switch = |parameter: usize| {
-        range.contains(&parameter) && effect.parameters[parameter - range.start].is_switch()
-    };
-    let columns = &fitted.fit.columns;
-    let switches: Vec<usize> = (0..columns.len())
-        .filter(|&i| is_switch(columns[i].parameter))
-        .collect();
+    let own = fitted.model.place_of(k);
+    let all = switches(&fitted.model);
+    let switches = (fitted.fit).columns_of(|k| own.contains(&k) && all.contains(&k));
     if switches.is_empty() {
         return None;
     }
     let uncertainty = uncertainty(&problem.shooting, &fitted.fit);
-    let covariance = uncertainty
-        .covariance
-        .select_rows(&switches)
-        .select_columns(&switches);
-    let values = DVector::from_iterator(
-        switches.len(),
-        switches.iter().map(|&i| {
-            let log = columns[i].log.map(|log| &problem.logs[log]);
-            fitted.model.value_of(columns[i].parameter, log)
-        }),
-    );
+    let covariance = submatrix(&uncertainty.covariance, &switches, &switches);
+    let value = |&i: &usize| {
+        let column = fitted.fit.columns[i];
+        let log = column.log.map(|log| &problem.logs[log]);
+        fitted.model.value_of(column.parameter, log)
+    };
+    let values = DVector::from_iterator(switches.len(), switches.iter().map(value));
     let statistic = squared_distance(&covariance, &values);
     Some(f_test(statistic, switches.len(), uncertainty.blocks))
 }

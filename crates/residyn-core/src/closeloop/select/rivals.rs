@@ -70,7 +70,7 @@ fn instead_of(
     let mut options: Vec<(f64, &FittedEffect)> = (screening.present().len()..screening.items.len())
         .filter_map(|item| {
             let set = [others.as_slice(), &[item]].concat();
-            Some((screening.losses(&set)?.iter().sum(), &screening.items[item]))
+            Some((screening.loss(&set)?, &screening.items[item]))
         })
         .collect();
     options.sort_by(|a, b| a.0.total_cmp(&b.0));

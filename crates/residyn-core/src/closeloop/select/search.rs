@@ -379,9 +379,8 @@ impl<'a> Search<'a> {
         };
         let settings = &problem.settings.select;
         let within = |set: &Vec<usize>| {
-            let losses = screening.losses(set);
-            let sum = losses.map_or(f64::INFINITY, |losses| losses.iter().sum());
-            sum <= best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
+            let loss = screening.loss(set).unwrap_or(f64::INFINITY);
+            loss <= best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
         };
         let all = screening.present();
         let mut unshifted = all.clone();

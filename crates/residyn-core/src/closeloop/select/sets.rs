@@ -12,8 +12,7 @@ pub fn best_predicted(screening: &Screening, problem: &Problem<'_>) -> Vec<Set> 
     let most = settings.most_effects_of(problem.declared.joints);
     let step = problem.of_whole(settings.round_gain);
     let start = screening.present();
-    let total = |set: &Set| Some(screening.losses(set)?.iter().sum::<f64>());
-    let Some(first) = total(&start) else {
+    let Some(first) = screening.loss(&start) else {
         return Vec::new();
     };
     let mut seen: HashSet<Set> = HashSet::from([start.clone()]);
@@ -28,7 +27,7 @@ pub fn best_predicted(screening: &Screening, problem: &Problem<'_>) -> Vec<Set> 
         next.retain(|set| seen.insert(set.clone()));
         let mut scored: Vec<(f64, Set)> = next
             .into_par_iter()
-            .filter_map(|set| Some((total(&set)?, set)))
+            .filter_map(|set| Some((screening.loss(&set)?, set)))
             .collect();
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
         scored.truncate(settings.beam_width);
@@ -75,7 +74,7 @@ pub fn descent(screening: &Screening, from: Set) -> Vec<Set> {
         let without = |k: usize| {
             let mut less = current.clone();
             less.remove(k);
-            Some((screening.losses(&less)?.iter().sum::<f64>(), less))
+            Some((screening.loss(&less)?, less))
         };
         let less: Vec<(f64, Set)> = (0..current.len())
             .into_par_iter()

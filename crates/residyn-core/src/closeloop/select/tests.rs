@@ -48,7 +48,7 @@ fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
     let Declared { problem, fitted } = problem.fit_declared().unwrap();
     let all = candidates(&problem, &[]);
     let screening = Screening::of(&problem, &fitted, &all).unwrap();
-    let loss = |set: &[usize]| screening.losses(set).unwrap().iter().sum::<f64>();
+    let loss = |set: &[usize]| screening.loss(set).unwrap();
     let known: f64 = left_out_losses(&problem, &fitted.fit).iter().sum();
     assert!((loss(&[]) / known - 1.0).abs() < 0.01);
 
