@@ -46,10 +46,13 @@ pub struct Chosen {
 impl Chosen {
     /// Number of established effects.
     pub fn established(&self) -> usize {
-        let standings = self.standings.iter();
-        standings
-            .filter(|s| s.status == Status::Established)
-            .count()
+        self.named().count()
+    }
+
+    /// The established effects.
+    pub(super) fn named(&self) -> impl Iterator<Item = &FittedEffect> {
+        let established = |s: &&Standing| s.status == Status::Established;
+        self.standings.iter().filter(established).map(|s| &s.effect)
     }
 }
 
@@ -61,22 +64,19 @@ pub fn establish(
     selected: Selected,
     watch: &dyn Watch,
 ) -> Chosen {
-    let Selected {
-        chosen,
-        rounds,
-        stopped,
-    } = selected;
-    let chosen = match chosen {
+    let none = Chosen {
+        after: before.clone(),
+        standings: Vec::new(),
+        rounds: selected.rounds,
+        stopped: selected.stopped,
+        rivals: Vec::new(),
+        failure: None,
+    };
+    let chosen = match selected.chosen {
         Ok(chosen) => chosen,
         Err(failure) => {
-            return Chosen {
-                after: before.clone(),
-                standings: Vec::new(),
-                rounds,
-                stopped,
-                rivals: Vec::new(),
-                failure: Some(failure),
-            };
+            let failure = Some(failure);
+            return Chosen { failure, ..none };
         }
     };
     watch.see(Stage::Establish.into());
@@ -87,17 +87,15 @@ pub fn establish(
     let established: Vec<bool> = (standings.iter())
         .map(|standing| standing.status == Status::Established)
         .collect();
+    let rivals = match watch.has_to_end() {
+        true => Vec::new(),
+        false => rivals(problem, &chosen, &without, &established),
+    };
     Chosen {
-        rivals: if watch.has_to_end() {
-            Vec::new()
-        } else {
-            rivals(problem, &chosen, &without, &established)
-        },
+        rivals,
         standings,
-        rounds,
-        stopped,
         after: chosen.fitted,
-        failure: None,
+        ..none
     }
 }
 

@@ -205,17 +205,15 @@ impl<'a> Problem<'a> {
     }
 
     fn fitted_over(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fitted, FitError> {
-        let model = self.smoothed(model);
-        let dynamics = self.error_model.compile(&model);
-        let start_states = shooting.initial_start_states(0);
-        let found = fit_windows(
-            shooting,
-            &dynamics,
-            &self.active(&dynamics),
-            start_states,
-            None,
-        )?;
-        Ok(Fitted::new(&model, &dynamics, found, self.logs))
+        self.fitted_by(model, |dynamics, active| {
+            fit_windows(
+                shooting,
+                dynamics,
+                active,
+                shooting.initial_start_states(0),
+                None,
+            )
+        })
     }
 
     /// What the logs determine of the declared parameters and of the file's effects, together with all effects of a

@@ -7,7 +7,8 @@ use super::settings::{FitSettings, Settings};
 use super::split::by_numbers;
 use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{
-    FitError, Identifiability, LevenbergMarquardt, Shooting, Solver, cut, fit_below, fit_by,
+    Fit, FitError, Identifiability, LevenbergMarquardt, Shooting, Solver, Values, cut, fit_below,
+    fit_by,
 };
 use crate::model::{Dynamics, Effect, FittedEffect, Library, Model, Parameter};
 
@@ -189,32 +190,17 @@ impl<'a> Problem<'a> {
         'a: 'b,
     {
         let windows = cut(logs, self.settings.fit.window_s);
-        let shooting = self
-            .error_model
-            .shooting(
-                logs,
-                windows,
-                &self.shooting.noise,
-                &self.smoothing_velocities,
-            )
-            .near(self.declared);
+        let noise = &self.shooting.noise;
+        let shooting =
+            (self.error_model).shooting(logs, windows, noise, &self.smoothing_velocities);
+        let same: &Problem<'b> = self;
         Problem {
-            declared: self.declared,
-            library: self.library,
-            error_model: self.error_model,
-            solver: self.solver,
-            settings: self.settings,
             logs,
             audits: Arc::default(),
-            smoothing_velocities: self.smoothing_velocities.clone(),
-            top_speed: self.top_speed.clone(),
-            top_torque: self.top_torque.clone(),
-            top_driving: self.top_driving.clone(),
-            sample: Sample::of(&shooting, self.settings.fit.sample_windows),
-            shooting,
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
             held: Vec::new(),
+            ..same.over(shooting.near(self.declared))
         }
     }
 
@@ -285,17 +271,22 @@ impl<'a> Problem<'a> {
         start_states: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
+        self.fitted_by(model, |dynamics, active| {
+            let (solver, shooting) = (self.solver, &self.shooting);
+            fit_by(solver, shooting, dynamics, active, start_states, scale)
+        })
+    }
+
+    /// A model with the problem's smoothing of friction, fitted by `fit`, which is given the parameters that it may
+    /// change.
+    pub(super) fn fitted_by<E>(
+        &self,
+        model: &Model,
+        fit: impl FnOnce(&Dynamics, &[usize]) -> Result<(Values, Fit), E>,
+    ) -> Result<Fitted, E> {
         let model = self.smoothed(model);
         let dynamics = self.error_model.compile(&model);
-        let active = self.active(&dynamics);
-        let found = fit_by(
-            self.solver,
-            &self.shooting,
-            &dynamics,
-            &active,
-            start_states,
-            scale,
-        )?;
+        let found = fit(&dynamics, &self.active(&dynamics))?;
         Ok(Fitted::new(&model, &dynamics, found, self.logs))
     }
 
@@ -317,12 +308,9 @@ impl<'a> Problem<'a> {
         fitted: &Fitted,
         effects: Vec<FittedEffect>,
     ) -> Result<Fitted, FitError> {
-        let (start_states, scale) = (fitted.fit.start_states.clone(), fitted.fit.scale);
-        self.refit(
-            &fitted.model.with_effects(effects),
-            start_states,
-            Some(scale),
-        )
+        let start_states = fitted.fit.start_states.clone();
+        let model = fitted.model.with_effects(effects);
+        self.refit(&model, start_states, Some(fitted.fit.scale))
     }
 
     /// As [`Problem::with_effects`], if only a loss below `below` is of use: `None` if the model cannot be fitted or
@@ -333,20 +321,15 @@ impl<'a> Problem<'a> {
         effects: Vec<FittedEffect>,
         below: f64,
     ) -> Option<Fitted> {
-        let model = self.smoothed(&fitted.model.with_effects(effects));
-        let dynamics = self.error_model.compile(&model);
-        let (active, start_states) = (self.active(&dynamics), fitted.fit.start_states.clone());
+        let start_states = fitted.fit.start_states.clone();
         let aim = (fitted.fit.scale, below);
-        let found = fit_below(
-            self.solver,
-            &self.shooting,
-            &dynamics,
-            &active,
-            start_states,
-            aim,
-        )
-        .ok()??;
-        Some(Fitted::new(&model, &dynamics, found, self.logs))
+        let model = fitted.model.with_effects(effects);
+        let fitted = self.fitted_by(&model, |dynamics, active| {
+            let (solver, shooting) = (self.solver, &self.shooting);
+            let found = fit_below(solver, shooting, dynamics, active, start_states, aim);
+            found.ok().flatten().ok_or(())
+        });
+        fitted.ok()
     }
 
     /// The same without the k-th effect of a model.

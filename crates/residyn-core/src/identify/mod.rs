@@ -42,6 +42,7 @@ pub use outcome::{Fit, FitError, Termination};
 pub use search::{Linearised, Purpose, Search, Step};
 pub use sensitivity::Local;
 pub use shooting::Shooting;
+pub(crate) use shooting::rms_by_joint;
 pub use solver::Solver;
 pub use sums::huber;
 pub use torques::{TorqueFit, fit_torques};

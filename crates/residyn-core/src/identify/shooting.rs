@@ -281,9 +281,11 @@ impl<'l> Shooting<'l> {
         start_states: &[Vec<f64>],
     ) -> Vec<f64> {
         let residuals = self.residuals(dynamics, values, start_states);
-        let shares = deviations(&residuals, dynamics.joints);
+        let shares = rms_by_joint(&residuals, dynamics.joints);
         let noise = self.noise.iter().zip(shares);
-        noise.map(|(noise, share)| noise * share).collect()
+        noise
+            .map(|(noise, share)| noise * share.max(1e-12))
+            .collect()
     }
 
     /// The Huber loss of each window at residual scale `scale`, including its start state; infinite if the model
@@ -363,17 +365,17 @@ impl<'l> Shooting<'l> {
 }
 
 /// Root mean square of each joint's residuals, `[window][row * joints + joint]`.
-fn deviations(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
+pub(crate) fn rms_by_joint(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0_f64); joints];
-    for row in residuals
+    let rows = residuals
         .iter()
-        .flat_map(|window| window.chunks_exact(joints))
-    {
+        .flat_map(|window| window.chunks_exact(joints));
+    for row in rows {
         for (sum, residual) in sums.iter_mut().zip(row) {
             *sum = (sum.0 + residual * residual, sum.1 + 1.0);
         }
     }
-    let root = |(squares, rows): (f64, f64)| (squares / rows.max(1.0)).sqrt().max(1e-12);
+    let root = |(squares, rows): (f64, f64)| (squares / rows.max(1.0)).sqrt();
     sums.into_iter().map(root).collect()
 }
 
@@ -389,26 +391,21 @@ mod tests {
     use std::sync::Arc;
 
     use super::{Measure, Pack, Shooting, Values};
-    use crate::data::{Joint, Log, Quantity};
+    use crate::data::{Joint, Log};
     use crate::identify::cut;
     use crate::identify::sensitivity::{Local, Tangent};
-    use crate::model::{FittedEffect, Library};
+    use crate::model::{Dynamics, FittedEffect, Library};
 
     /// Two seconds of an arbitrary motion and torque at 100 Hz.
     fn log() -> Log {
         let time: Vec<f64> = (0..200).map(|row| 0.01 * f64::from(row)).collect();
         let column = |f: fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect::<Vec<f64>>()];
         Log {
-            path: "some.csv".into(),
             q: column(|t| 0.01 * (3.0 * t).sin()),
             qd: column(|t| 0.03 * (3.0 * t).cos()),
             tau: column(|t| (20.0 * t).sin() + (31.0 * t).cos()),
-            driven_by: Quantity::Torque,
-            masked: vec![Vec::new()],
-            filled: Vec::new(),
-            leave_out: Vec::new(),
-            notes: Vec::new(),
             time,
+            ..Log::empty(1)
         }
     }
 
@@ -430,6 +427,32 @@ mod tests {
         assert!(Arc::ptr_eq(&packs(&first), &packs(&again)));
         let fine = copy.in_steps_of(1e-3);
         assert!(!Arc::ptr_eq(&packs(&shooting), &packs(&fine)));
+    }
+
+    /// Each free parameter with the gradient of the cost, and the cost after a step of that parameter.
+    fn gradients<'a>(
+        shooting: &'a Shooting<'_>,
+        model: &'a Dynamics,
+        tangent: &'a Tangent,
+        values: &'a [f64],
+        start_states: &'a [Vec<f64>],
+    ) -> impl Iterator<Item = (usize, f64, impl Fn(f64) -> f64 + 'a)> + 'a {
+        let point = |common: Vec<f64>| {
+            let own = Vec::new();
+            Values { common, own }
+        };
+        let terms = shooting.linearise(model, tangent, &point(values.to_vec()), start_states, 1.0);
+        assert!(terms.len() > 1);
+        tangent.active.iter().enumerate().map(move |(column, &k)| {
+            let found = terms.iter().map(|terms| terms.gradient[column]).sum();
+            let cost = move |step: f64| -> f64 {
+                let mut moved = values.to_vec();
+                moved[k] += step;
+                let costs = shooting.costs(model, &point(moved), start_states, 1.0);
+                costs.iter().sum()
+            };
+            (k, found, cost)
+        })
     }
 
     #[test]
@@ -455,29 +478,10 @@ mod tests {
         let mut values = model.values();
         let first = values.len() - 3;
         values[first..].copy_from_slice(&[0.0073, 0.015, 0.1]);
-        let point = |values: &[f64]| Values {
-            common: values.to_vec(),
-            own: Vec::new(),
-        };
-        let cost = |values: &[f64]| -> f64 {
-            let costs = shooting.costs(&model, &point(values), &start_states, 1.0);
-            costs.iter().sum()
-        };
-        let terms = shooting.linearise(&model, &tangent, &point(&values), &start_states, 1.0);
-        assert!(terms.len() > 1);
-        for (column, k) in active.into_iter().enumerate() {
-            let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
-            let moved = |step: f64| {
-                let mut moved = values.clone();
-                moved[k] += step;
-                cost(&moved)
-            };
-            let wanted = (moved(1e-6) - moved(-1e-6)) / 2e-6;
-            assert!(
-                (found - wanted).abs() < 1e-2 * wanted.abs().max(1e-6),
-                "{}: {found} {wanted}",
-                model.parameters[k].name
-            );
+        for (k, found, cost) in gradients(&shooting, &model, &tangent, &values, &start_states) {
+            let wanted = (cost(1e-6) - cost(-1e-6)) / 2e-6;
+            let off = (found - wanted).abs() / wanted.abs().max(1e-6);
+            assert!(off < 1e-2, "{}: {found} {wanted}", model.parameters[k].name);
         }
     }
 
@@ -496,26 +500,14 @@ mod tests {
             let tangent = Tangent::new(&model, &[1, 2, 3, 4], local);
             for (delay, lag) in [(0.0, 0.0), (0.0073, 0.015)] {
                 let values = [15.0, 3.0, delay, lag, 0.01, 0.0];
-                let point = |values: &[f64]| Values {
-                    common: values.to_vec(),
-                    own: Vec::new(),
-                };
-                let cost = |values: &[f64]| -> f64 {
-                    shooting
-                        .costs(&model, &point(values), &start_states, 1.0)
-                        .iter()
-                        .sum()
-                };
-                let terms =
-                    shooting.linearise(&model, &tangent, &point(&values), &start_states, 1.0);
-                for (column, k) in [1, 2, 3, 4].into_iter().enumerate() {
-                    let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
-                    let mut moved = values;
-                    moved[k] += 1e-7;
-                    let wanted = (cost(&moved) - cost(&values)) / 1e-7;
+                for (k, found, cost) in
+                    gradients(&shooting, &model, &tangent, &values, &start_states)
+                {
+                    let wanted = (cost(1e-7) - cost(0.0)) / 1e-7;
+                    let off = (found - wanted).abs() / wanted.abs();
                     assert!(
-                        (found - wanted).abs() < 1e-4 * wanted.abs(),
-                        "{local:?}, parameter {k} at {delay}, {lag}: {found} {wanted}"
+                        off < 1e-4,
+                        "{local:?}, {k} at {delay}, {lag}: {found} {wanted}"
                     );
                 }
             }

@@ -21,7 +21,7 @@ use super::problem::Problem;
 use super::stage::{Stage, Watch};
 use crate::data::Joint;
 use crate::data::statistics::wilson;
-use crate::model::{FittedEffect, Model, Status};
+use crate::model::{FittedEffect, Model};
 use crate::streams::{Purpose, stream};
 
 /// The results of the search on logs simulated from the accepted model, with the torques and the noise of the user's
@@ -198,10 +198,8 @@ impl<'a> Calibrator<'a> {
         };
         watch.see(Stage::Fit.into());
         let found = find(problem.fit_declared()?, &[], &mut rng, watch)?;
-        let established = found.chosen.standings.iter();
-        let established = established.filter(|s| s.status == Status::Established);
         Ok(Some(Searched {
-            named: established.map(|s| Named::of(&s.effect)).collect(),
+            named: found.chosen.named().map(Named::of).collect(),
             unexplained: found.unexplained.is_significant(),
         }))
     }

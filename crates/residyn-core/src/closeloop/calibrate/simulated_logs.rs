@@ -88,14 +88,10 @@ fn apart(problem: &Problem<'_>) -> Vec<Log> {
     let block = |index: usize, log: &Log| {
         let reach = half_width_s(log.median_step());
         let mut out = Log {
-            time: Vec::new(),
-            q: vec![Vec::new(); log.joints()],
-            qd: vec![Vec::new(); log.joints()],
-            tau: vec![Vec::new(); log.joints()],
-            masked: vec![Vec::new(); log.joints()],
-            filled: Vec::new(),
-            leave_out: Vec::new(),
-            ..log.clone()
+            path: log.path.clone(),
+            driven_by: log.driven_by,
+            notes: log.notes.clone(),
+            ..Log::empty(log.joints())
         };
         for window in windows.iter().filter(|window| window.log == index) {
             let before = row_from(&log.time, log.time[window.first] - reach);

@@ -146,11 +146,8 @@ impl Sum {
     }
 
     fn magnitudes(&self) -> Vec<f64> {
-        self.effect
-            .values
-            .iter()
-            .map(|(value, _)| value.abs())
-            .collect()
+        let values = self.effect.values.iter();
+        values.map(|(value, _)| value.abs()).collect()
     }
 }
 
@@ -167,11 +164,8 @@ fn effect(terms: &[Term]) -> Effect {
 
 /// An effect file with one coefficient a term, with these typical magnitudes.
 fn file(terms: &[Term], magnitudes: &[f64]) -> String {
-    let sum: Vec<String> = terms
-        .iter()
-        .zip(1..)
-        .map(|((term, _), k)| format!("c_{k}*{term}"))
-        .collect();
+    let weighed = |((term, _), k): (&Term, usize)| format!("c_{k}*{term}");
+    let sum: Vec<String> = terms.iter().zip(1..).map(weighed).collect();
     let mut text = format!(
         "[effect]\nname = \"proposed\"\nabout = \"a formula fitted to the residual; not a finding\"\n\
          force = \"{}\"\n\n[parameters]\n",
@@ -195,27 +189,21 @@ fn unit([q, qd, tau, t]: [i32; 4]) -> String {
         1 => Some(unit.to_owned()),
         _ => Some(format!("{unit}^{power}")),
     };
-    let listed =
-        |parts: &[Option<String>]| -> Vec<String> { parts.iter().flatten().cloned().collect() };
     // The torque that the term gives, over the torques in it; seconds count on both sides.
-    let force = match tau {
-        0 => Some("N m".to_owned()),
-        _ => None,
-    };
-    let over = listed(&[
-        if tau > 1 {
-            powers("(N m)", tau - 1)
-        } else {
-            None
-        },
+    let above = [
+        powers("N m", i32::from(tau == 0)),
+        powers("s", qd - qd.min(t)),
+    ];
+    let over = [
+        powers("(N m)", (tau - 1).max(0)),
         powers("rad", q + qd),
         powers("s", t - qd.min(t)),
-    ]);
-    let above = listed(&[force, powers("s", qd - qd.min(t))]);
-    let above = if above.is_empty() {
-        "1".to_owned()
-    } else {
-        above.join(" ")
+    ];
+    let [above, over] = [Vec::from(above), Vec::from(over)]
+        .map(|parts| -> Vec<String> { parts.into_iter().flatten().collect() });
+    let above = match above.is_empty() {
+        true => "1".to_owned(),
+        false => above.join(" "),
     };
     match over.as_slice() {
         [] => above,

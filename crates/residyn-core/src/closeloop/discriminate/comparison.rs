@@ -8,7 +8,7 @@ use crate::closeloop::problem::Problem;
 use crate::closeloop::select::Rival;
 use crate::closeloop::settings::{DiscriminateSettings, Settings};
 use crate::data::{Joint, Log};
-use crate::identify::{Fit, Shooting, Solver, Values, fit_by, uncertainty};
+use crate::identify::{Fit, Shooting, Solver, Values, fit_by, rms_by_joint, uncertainty};
 use crate::model::{Dynamics, FittedEffect, Model};
 
 /// One of two explanations.
@@ -32,15 +32,9 @@ impl Hypothesis {
             let mut known = fitted.model.effects.iter().chain([&rival.effect]);
             known.any(|other| other.is_same(effect))
         };
-        let effects: Vec<FittedEffect> = rival
-            .fitted
-            .model
-            .effects
-            .iter()
-            .filter(stands)
-            .cloned()
-            .collect();
-        Self::new(problem, &rival.fitted.model.with_effects(effects))
+        let model = &rival.fitted.model;
+        let effects = model.effects.iter().filter(stands).cloned().collect();
+        Self::new(problem, &model.with_effects(effects))
     }
 
     fn with(&self, payload: Option<&Payload>) -> Self {
@@ -178,13 +172,8 @@ impl<'a> Comparison<'a> {
         let times = self.present.logs.iter().flat_map(|log| &log.time);
         let latest_s = times.fold(0.0_f64, |latest, time| latest.max(time.abs()));
         let declared = self.problem.declared.parameters.len();
-        let truth = &self.truth;
-        Payload::all(
-            &truth.dynamics,
-            declared,
-            self.settings().payload_share,
-            2.0 * latest_s + 10.0,
-        )
+        let (share, delay_s) = (self.settings().payload_share, 2.0 * latest_s + 10.0);
+        Payload::all(&self.truth.dynamics, declared, share, delay_s)
     }
 
     fn loaded(&self, fitted: &Fitted, payload: &Payload) -> Experiment {
@@ -268,21 +257,10 @@ fn differences(
     start_states: &[Vec<f64>],
     first: usize,
 ) -> Vec<f64> {
-    let n = model.dynamics.joints;
     let residuals = shooting.residuals(&model.dynamics, values, start_states);
-    let residuals: Vec<f64> = residuals[first..].concat();
-    let square = |j: usize| {
-        residuals
-            .iter()
-            .skip(j)
-            .step_by(n)
-            .map(|r| r * r)
-            .sum::<f64>()
-    };
-    let rows = (residuals.len() / n).max(1) as f64;
-    (0..n)
-        .map(|j| (square(j) / rows).sqrt() * shooting.noise[j])
-        .collect()
+    let rms = rms_by_joint(&residuals[first..], model.dynamics.joints);
+    let both = rms.iter().zip(&shooting.noise);
+    both.map(|(rms, noise)| rms * noise).collect()
 }
 
 /// How much more the estimates of a fit scatter than with independent normal residuals of its scale, as a ratio of

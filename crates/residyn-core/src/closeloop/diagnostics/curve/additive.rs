@@ -76,14 +76,11 @@ impl Sums {
         weights: &DVector<f64>,
         blocks: &[usize],
     ) -> Vec<Self> {
-        let count = blocks.last().map_or(0, |last| last + 1);
-        let rows_of = |block: usize| {
-            let first = blocks.partition_point(|b| *b < block);
-            (first, blocks.partition_point(|b| *b <= block) - first)
-        };
-        (0..count)
+        let mut next = 0;
+        (blocks.chunk_by(|a, b| a == b))
             .map(|block| {
-                let (first, rows) = rows_of(block);
+                let (first, rows) = (next, block.len());
+                next += rows;
                 let x = design.rows(first, rows);
                 let y = forces.rows(first, rows);
                 let w = DMatrix::from_diagonal(&weights.rows(first, rows).into_owned());
