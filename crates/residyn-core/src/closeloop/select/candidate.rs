@@ -24,10 +24,10 @@ pub fn candidates(problem: &Problem<'_>, present: &[FittedEffect]) -> Vec<Fitted
 /// These effects on every joint where each can act and be observed.
 pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
-    for effect in effects
+    let observable = effects
         .iter()
-        .filter(|effect| problem.error_model.shows(effect))
-    {
+        .filter(|effect| problem.error_model.shows(effect));
+    for effect in observable {
         for joint in Joint::all(problem.declared.joints) {
             if is_driven_enough(problem, effect, joint)
                 && !is_identified_by_bodies(problem, effect)
@@ -35,10 +35,8 @@ pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
                 && problem.declared.can_carry(effect, joint).is_ok()
             {
                 let (speed, torque) = (problem.top_speed[joint], problem.top_torque[joint]);
-                all.push(FittedEffect::absent(
-                    &effect.measured_by(speed, torque),
-                    joint,
-                ));
+                let effect = effect.measured_by(speed, torque);
+                all.push(FittedEffect::absent(&effect, joint));
             }
         }
     }
@@ -89,10 +87,9 @@ pub fn best_start(
     if starts.len() < 2 {
         return starts.pop();
     }
-    let start_states = problem.sample.start_states(&fitted.fit.start_states);
     match has_switch(candidate) {
-        true => best_by_switches(problem, fitted, &starts, &start_states),
-        false => best_by_cost(problem, fitted, starts, &start_states),
+        true => best_by_switches(problem, fitted, &starts),
+        false => best_by_cost(problem, fitted, starts),
     }
 }
 
@@ -102,13 +99,8 @@ pub fn screened_cost(
     fitted: &Fitted,
     candidate: &FittedEffect,
 ) -> Option<f64> {
-    linearised_cost(
-        problem,
-        &problem.shooting,
-        fitted,
-        candidate,
-        &fitted.fit.start_states,
-    )
+    let start_states = &fitted.fit.start_states;
+    linearised_cost(problem, &problem.shooting, fitted, candidate, start_states)
 }
 
 /// As [`screened_cost`], over a sample of the windows.
@@ -143,10 +135,8 @@ pub fn beside(problem: &Problem<'_>, fitted: &Fitted, candidate: &FittedEffect) 
         return None;
     }
     let mut beside = fitted.clone();
-    let mut added = beside
-        .model
-        .effects
-        .split_off(problem.declared.effects.len());
+    let declared = problem.declared.effects.len();
+    let mut added = beside.model.effects.split_off(declared);
     added.retain(|present| !candidate.contains(present));
     beside.model.effects.extend(added);
     Some(beside)
@@ -157,22 +147,12 @@ fn best_by_cost(
     problem: &Problem<'_>,
     fitted: &Fitted,
     starts: Vec<FittedEffect>,
-    start_states: &[Vec<f64>],
 ) -> Option<FittedEffect> {
-    let predicted = |start: FittedEffect| {
-        let cost = linearised_cost(
-            problem,
-            &problem.sample.shooting,
-            fitted,
-            &start,
-            start_states,
-        )?;
-        Some((start, cost))
-    };
-    let predicted: Vec<(FittedEffect, f64)> =
-        starts.into_par_iter().filter_map(predicted).collect();
-    let best = predicted.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some(best.0)
+    let predicted = |start| Some((screened_cost_on_sample(problem, fitted, &start)?, start));
+    let predicted = starts.into_par_iter().filter_map(predicted);
+    let predicted: Vec<(f64, FittedEffect)> = predicted.collect();
+    let best = predicted.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(best.1)
 }
 
 /// As above, for a candidate that is absent at every starting point: one linearisation compares all of them, since only
@@ -181,7 +161,6 @@ fn best_by_switches(
     problem: &Problem<'_>,
     fitted: &Fitted,
     starts: &[FittedEffect],
-    start_states: &[Vec<f64>],
 ) -> Option<FittedEffect> {
     let numbered = starts.iter().enumerate().map(|(number, start)| {
         let mut start = start.clone();
@@ -198,9 +177,9 @@ fn best_by_switches(
     let switches = switches(&model);
     let mut active = problem.active(&dynamics);
     active.retain(|k| *k < places[0].start || switches.contains(k));
-    let shooting = &problem.sample.shooting;
-    let scale = fitted.fit.scale;
-    let fit = as_it_stands(shooting, &dynamics, &active, start_states.to_vec(), scale).ok()?;
+    let start_states = problem.sample.start_states(&fitted.fit.start_states);
+    let (shooting, scale) = (&problem.sample.shooting, fitted.fit.scale);
+    let fit = as_it_stands(shooting, &dynamics, &active, start_states, scale).ok()?;
     let all = fit.equations_and_prior();
     let cost = |place: &Range<usize>| {
         let own = fit.columns_of(|k| k < places[0].start || place.contains(&k));
