@@ -9,6 +9,7 @@ use super::fitted::Fitted;
 use super::prepare::Prepared;
 use super::problem::Problem;
 use super::select::baseline_friction;
+use super::smoothing::width;
 use super::stage::{Stage, Watch};
 use super::start::around;
 use crate::identify::{
@@ -116,11 +117,8 @@ impl<'a> Problem<'a> {
             return Ok(best);
         }
         let fitted = |share: &f64| {
-            let widths: Vec<f64> = self
-                .top_speed
-                .iter()
-                .map(|top| share * top.max(1e-6))
-                .collect();
+            let of_joint = |top: &f64| width(*share, *top);
+            let widths: Vec<f64> = self.top_speed.iter().map(of_joint).collect();
             let model = model.with_smoothing_velocities(widths.clone());
             let found = fit_torques(self.solver, &model, self.declared, self.logs)?;
             Ok((found.shooting.noise, widths))

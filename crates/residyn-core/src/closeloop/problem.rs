@@ -4,11 +4,12 @@ use std::sync::{Arc, OnceLock};
 use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
+use super::smoothing::width;
 use super::split::by_numbers;
 use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{
     Fit, FitError, Identifiability, LevenbergMarquardt, Shooting, Solver, Values, cut, fit_below,
-    fit_by,
+    fit_by, free_parameters,
 };
 use crate::model::{Dynamics, Effect, FittedEffect, Library, Model, Parameter};
 
@@ -124,12 +125,8 @@ impl<'a> Problem<'a> {
                 .max(channel.resolution / 12.0_f64.sqrt())
                 .max(1e-9)
         });
-        let by_speed = || {
-            top_speed
-                .iter()
-                .map(|speed| smoothing_velocity_share * speed.max(1e-6))
-                .collect()
-        };
+        let of_joint = |top: &f64| width(smoothing_velocity_share, *top);
+        let by_speed = || top_speed.iter().map(of_joint).collect();
         let smoothing_velocities: Vec<f64> =
             declared.smoothing_velocity.clone().unwrap_or_else(by_speed);
         // Torque noise is unknown before the first fit, so start from 1.
@@ -367,7 +364,8 @@ impl<'a> Problem<'a> {
 
     /// Parameters that a fit may change.
     pub fn active(&self, dynamics: &Dynamics) -> Vec<usize> {
-        let free = |k: &usize| !dynamics.parameters[*k].fixed && !self.held.contains(k);
-        (0..dynamics.parameters.len()).filter(free).collect()
+        let mut active = free_parameters(dynamics);
+        active.retain(|k| !self.held.contains(k));
+        active
     }
 }

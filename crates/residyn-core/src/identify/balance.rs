@@ -60,11 +60,8 @@ impl Acting {
             acting.tau.push(tau.collect());
             let slopes = dynamics.filters.iter().map(|filter| {
                 let delivered = filtered[filter.joint].as_ref();
-                smoothed(
-                    delivered
-                        .expect("the joint has a filter")
-                        .slopes(filter.kind),
-                )
+                let delivered = delivered.expect("the joint has a filter");
+                smoothed(delivered.slopes(filter.kind))
             });
             acting.slopes.push(slopes.collect());
         }
@@ -92,13 +89,11 @@ impl Balance {
         noise: &[f64],
     ) -> Self {
         let lane = |lane: usize| members[lane.min(members.len() - 1)];
-        let ranges: Vec<_> = members
-            .iter()
-            .map(|&w| {
-                let window = &windows[w];
-                rows[window.log].within(&logs[window.log], window)
-            })
-            .collect();
+        let range = |&w: &usize| {
+            let window = &windows[w];
+            rows[window.log].within(&logs[window.log], window)
+        };
+        let ranges: Vec<_> = members.iter().map(range).collect();
         let longest = ranges.iter().map(|range| range.len()).max().unwrap_or(0);
         let at = |row: usize| {
             std::array::from_fn(|lane| {

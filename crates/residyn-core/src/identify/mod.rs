@@ -46,4 +46,5 @@ pub(crate) use shooting::rms_by_joint;
 pub use solver::Solver;
 pub use sums::huber;
 pub use torques::{TorqueFit, fit_torques};
+pub(crate) use values::free_parameters;
 pub use values::{Column, Own, Values};

@@ -46,10 +46,12 @@ impl Pack {
             .map(|&w| windows[w].rows())
             .max()
             .unwrap_or(0);
+        // Empty lanes repeat the last window, without weight.
+        let window_of = |lane: usize| &windows[members[lane.min(members.len() - 1)]];
         let zeros = || vec![vec![Row::splat(0.0); n]; rows];
         let mut pack = Self {
             windows: members.to_vec(),
-            logs: std::array::from_fn(|lane| windows[members[lane.min(members.len() - 1)]].log),
+            logs: std::array::from_fn(|lane| window_of(lane).log),
             at: vec![[0; LANES]; rows],
             time: vec![Row::splat(0.0); rows],
             dt: vec![Row::splat(0.0); rows],
@@ -70,8 +72,7 @@ impl Pack {
             }
         }
         for lane in 0..LANES {
-            // Empty lanes repeat the last window, without weight.
-            let window = windows[members[lane.min(members.len() - 1)]];
+            let window = window_of(lane);
             let log = &logs[window.log];
             for row in 0..rows {
                 let at = (window.first + row).min(window.last);

@@ -57,10 +57,8 @@ impl<'l> Shooting<'l> {
         // Windows of similar length share a pack, which keeps the padding small.
         order.sort_by_key(|&w| windows[w].rows());
         let half_widths = half_widths(logs);
-        let packs = order
-            .chunks(LANES)
-            .map(|chunk| Pack::new(logs, &windows, chunk, noise, &half_widths))
-            .collect();
+        let pack = |chunk| Pack::new(logs, &windows, chunk, noise, &half_widths);
+        let packs = order.chunks(LANES).map(pack).collect();
         Self {
             logs,
             windows,
@@ -82,10 +80,8 @@ impl<'l> Shooting<'l> {
         noise: &[f64],
         smoothing_velocities: &[f64],
     ) -> Self {
-        let rows = logs
-            .par_iter()
-            .map(|log| Rows::of(log, smoothing_velocities));
-        let rows = rows.collect();
+        let of_log = |log| Rows::of(log, smoothing_velocities);
+        let rows = logs.par_iter().map(of_log).collect();
         Self::of_rows(logs, Arc::new(rows), windows, noise)
     }
 
@@ -95,11 +91,8 @@ impl<'l> Shooting<'l> {
         mut windows: Vec<Window>,
         noise: &[f64],
     ) -> Self {
-        windows.retain(|window| {
-            !rows[window.log]
-                .within(&logs[window.log], window)
-                .is_empty()
-        });
+        let within = |window: &Window| rows[window.log].within(&logs[window.log], window);
+        windows.retain(|window| !within(window).is_empty());
         let order: Vec<usize> = (0..windows.len()).collect();
         let packs = order.chunks(LANES);
         let packs = packs.map(|chunk| Balance::new(logs, &rows, &windows, chunk, noise));
@@ -392,8 +385,8 @@ mod tests {
 
     use super::{Measure, Pack, Shooting, Values};
     use crate::data::{Joint, Log};
-    use crate::identify::cut;
     use crate::identify::sensitivity::{Local, Tangent};
+    use crate::identify::{cut, free_parameters};
     use crate::model::{Dynamics, FittedEffect, Library};
 
     /// Two seconds of an arbitrary motion and torque at 100 Hz.
@@ -472,9 +465,7 @@ mod tests {
         let logs = [log];
         let shooting = Shooting::of_torques(&logs, cut(&logs, 0.5), &[0.5, 0.2], &[0.01; 2]);
         let start_states = shooting.initial_start_states(0);
-        let free = |k: &usize| !model.parameters[*k].fixed;
-        let active: Vec<usize> = (0..model.parameters.len()).filter(free).collect();
-        let tangent = Tangent::new(&model, &active, Local::Nothing);
+        let tangent = Tangent::new(&model, &free_parameters(&model), Local::Nothing);
         let mut values = model.values();
         let first = values.len() - 3;
         values[first..].copy_from_slice(&[0.0073, 0.015, 0.1]);

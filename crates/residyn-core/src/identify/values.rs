@@ -113,6 +113,14 @@ impl Values {
     }
 }
 
+/// The parameters of a model that its file does not fix.
+pub(crate) fn free_parameters(dynamics: &Dynamics) -> Vec<usize> {
+    let parameters = &dynamics.parameters;
+    (0..parameters.len())
+        .filter(|&k| !parameters[k].fixed)
+        .collect()
+}
+
 /// One free value of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Column {
