@@ -94,12 +94,8 @@ impl<'a> Problem<'a> {
         let own = &self.declared.effects;
         let model = self.declared.with_effects([own, friction].concat());
         let problem = self.with_smoothing_velocities(self.best_smoothing_velocities(&model)?);
-        let beside = fit_torques(
-            self.solver,
-            &problem.smoothed(&model),
-            self.declared,
-            self.logs,
-        )?;
+        let smoothed = problem.smoothed(&model);
+        let beside = fit_torques(self.solver, &smoothed, self.declared, self.logs)?;
         // The logs there are already smoothed as needed here.
         let windows = cut(self.logs, self.settings.fit.window_s);
         let problem = problem.over(beside.shooting.over(windows));
@@ -136,9 +132,8 @@ impl<'a> Problem<'a> {
     /// The best of a few fits that begin at values around the declared ones, and where it began.
     fn fitted_around(&self, friction: &[FittedEffect]) -> Option<(Model, ByMotion)> {
         let fit = |start: Model| Some((self.fitted_from(&start, friction).ok()?, start));
-        let found = around(self)
-            .filter_map(fit)
-            .take(self.settings.fit.fitted_starts);
+        let found = around(self).filter_map(fit);
+        let found = found.take(self.settings.fit.fitted_starts);
         let (found, start) = found.min_by(|(a, _), (b, _)| cost(a).total_cmp(&cost(b)))?;
         Some((start, found))
     }
@@ -224,10 +219,9 @@ impl<'a> Problem<'a> {
         let mut verdict = identifiability(&dynamics, self.readiness(), &values, &fitted.fit);
         let known = verdict.hold.len() + verdict.determined;
         // Combinations that are neither determined nor held belong to bodies or, without bodies, to effects.
-        let open = if bodies.is_empty() {
-            0
-        } else {
-            verdict.free - known
+        let open = match bodies.is_empty() {
+            true => 0,
+            false => verdict.free - known,
         };
         let columns = fitted.fit.columns.iter();
         verdict.free = columns.filter(|column| column.parameter < end).count();

@@ -104,12 +104,9 @@ impl Prepared<'_> {
             return Err(StudyError::TooManyParameters { model, free });
         }
         if self.settings.score.horizons_s.is_empty() {
+            let horizons_s = self.unscored_s.iter().copied();
             return Err(StudyError::NoTest {
-                shortest_s: self
-                    .unscored_s
-                    .iter()
-                    .copied()
-                    .fold(f64::INFINITY, f64::min),
+                shortest_s: horizons_s.fold(f64::INFINITY, f64::min),
                 found: self.serious_in_test(),
             });
         }

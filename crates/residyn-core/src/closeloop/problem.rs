@@ -82,14 +82,8 @@ impl<'a> Problem<'a> {
         settings: &'a Settings,
     ) -> Self {
         let audits = logs.iter().map(|log| audit(log, &declared.columns));
-        let audits = audits.collect();
-        Self::audited(
-            declared,
-            library,
-            ErrorModel::OutputError,
-            (logs, audits),
-            settings,
-        )
+        let logs = (logs, audits.collect());
+        Self::audited(declared, library, ErrorModel::OutputError, logs, settings)
     }
 
     /// A problem of logs with their audits.
@@ -120,10 +114,8 @@ impl<'a> Problem<'a> {
         // Encoders finer than their noise show it; coarse ones add quantisation error.
         let noise = top(&|l, j| {
             let channel = &audits[l].joints[j].q;
-            channel
-                .noise_std
-                .max(channel.resolution / 12.0_f64.sqrt())
-                .max(1e-9)
+            let rounding = channel.resolution / 12.0_f64.sqrt();
+            channel.noise_std.max(rounding).max(1e-9)
         });
         let of_joint = |top: &f64| width(smoothing_velocity_share, *top);
         let by_speed = || top_speed.iter().map(of_joint).collect();
@@ -236,10 +228,8 @@ impl<'a> Problem<'a> {
     pub(super) fn started_from(&self) -> Model {
         let mut model = self.declared.clone();
         for parameter in &mut model.parameters {
-            let moved = self
-                .moved_to
-                .iter()
-                .find(|moved| moved.name == parameter.name);
+            let mut moved = self.moved_to.iter();
+            let moved = moved.find(|moved| moved.name == parameter.name);
             *parameter = moved.unwrap_or(parameter).clone();
         }
         model

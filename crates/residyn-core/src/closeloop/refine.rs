@@ -88,11 +88,8 @@ impl<'a> Problem<'a> {
             step_s,
             smoothing_velocity_factor: narrower,
         } = self.settings.refine;
-        let narrower = self
-            .declared
-            .smoothing_velocity
-            .as_ref()
-            .map_or(narrower, |_| 1.0);
+        let given = self.declared.smoothing_velocity.as_ref();
+        let narrower = given.map_or(narrower, |_| 1.0);
         let of_joint = |(width, top): (&f64, &f64)| match *width
             > self.settings.fit.smoothing_velocity_share * top
         {

@@ -34,6 +34,7 @@ pub use combinations::{Combination, IdentifiableBodies, identifiable_bodies};
 pub use distance::squared_distance;
 pub use fit::{as_it_stands, fit, fit_below, fit_by, predicted_cost};
 pub use identifiability::{Identifiability, Open, identifiability, open};
+pub(crate) use intervals::count;
 pub use intervals::{BLOCK_S, Uncertainty, blocks, blocks_of_times, uncertainty};
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use normal_equations::{Reduced, WindowTerms, submatrix, with_unit_diagonal};

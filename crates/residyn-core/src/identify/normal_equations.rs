@@ -1,6 +1,8 @@
 //! Normal equations of windows. A window's own values (its start state, and forces if they are free) do not enter other
 //! windows, so they are eliminated by the Schur complement before windows are summed.
 
+use std::ops::AddAssign;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::values::Layout;
@@ -23,6 +25,14 @@ impl WindowTerms {
             gradient: DVector::zeros(values),
             hessian: DMatrix::zeros(values, values),
         }
+    }
+}
+
+impl AddAssign<&Self> for WindowTerms {
+    fn add_assign(&mut self, other: &Self) {
+        self.cost += other.cost;
+        self.gradient += &other.gradient;
+        self.hessian += &other.hessian;
     }
 }
 

@@ -3,7 +3,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::Named;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::closeloop::select::{candidates, left_out_losses, starts};
+use crate::closeloop::select::{Folds, candidates, left_out_losses, starts};
 use crate::closeloop::settings::Settings;
 use crate::identify::{Fit, FitError, as_it_stands, fit, squared_distance, uncertainty};
 use crate::model::FittedEffect;
@@ -77,7 +77,7 @@ impl<'a> Baseline<'a> {
         let (_, free) = fit(shooting, &dynamics, &[], states, Some(scale))?;
         let (active, start_states) = (&accepted.fit.active, free.start_states);
         let fit = as_it_stands(shooting, &dynamics, active, start_states.clone(), scale)?;
-        let loss = left_out_losses(problem, &fit).iter().sum();
+        let loss = left_out_losses(&Folds::of(problem), &fit).iter().sum();
         Ok(Self {
             problem,
             accepted,

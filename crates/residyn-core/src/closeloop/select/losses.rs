@@ -1,7 +1,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::folds::{Folds, losses_by, steps_without};
+use super::folds::{Folds, left_out_losses, steps_without};
 use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
@@ -28,7 +28,7 @@ impl Losses {
     pub fn by(problem: &Problem<'_>, folds: &Folds, fitted: &Fitted) -> Self {
         let parts = problem.parts();
         let values = match problem.error_model {
-            ErrorModel::OutputError => losses_by(folds, &fitted.fit),
+            ErrorModel::OutputError => left_out_losses(folds, &fitted.fit),
             ErrorModel::InverseDynamics => {
                 of_torques(problem, folds, fitted, |r| huber(r / fitted.fit.scale))
             }

@@ -45,7 +45,9 @@ fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
     let all = candidates(&problem, &[]);
     let screening = Screening::of(&problem, &fitted, &all).unwrap();
     let loss = |set: &[usize]| screening.loss(set).unwrap();
-    let known: f64 = left_out_losses(&problem, &fitted.fit).iter().sum();
+    let known: f64 = left_out_losses(&Folds::of(&problem), &fitted.fit)
+        .iter()
+        .sum();
     assert!((loss(&[]) / known - 1.0).abs() < 0.01);
 
     let mut items = screening.items.iter().map(FittedEffect::label);
@@ -53,7 +55,9 @@ fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
     let coulomb = coulomb.unwrap();
     let effects = screening.effects(&[coulomb]);
     let with = problem.with_effects(&fitted, effects).unwrap();
-    let found: f64 = left_out_losses(&problem, &with.fit).iter().sum();
+    let found: f64 = left_out_losses(&Folds::of(&problem), &with.fit)
+        .iter()
+        .sum();
     assert!(found < 0.2 * known);
     let promised = loss(&[coulomb]);
     assert!(promised < 0.3 * known, "{promised} {found} {known}");
