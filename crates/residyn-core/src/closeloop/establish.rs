@@ -28,6 +28,24 @@ pub struct Standing {
     pub without: Result<Fitted, FitError>,
 }
 
+impl Standing {
+    /// An effect that nothing speaks against, with its gain and p-value, and the model refitted without it.
+    pub(super) fn sure(
+        effect: FittedEffect,
+        (gain, p_value): (f64, f64),
+        without: Result<Fitted, FitError>,
+    ) -> Self {
+        Self {
+            effect,
+            status: Status::Established,
+            gain,
+            p_value,
+            reason: None,
+            without,
+        }
+    }
+}
+
 /// The set of effects that was chosen.
 pub struct Chosen {
     /// The model with them, fitted.
@@ -115,16 +133,7 @@ pub(super) fn standings(
         let effect = chosen.fitted.model.effects[k].clone();
         let less = match less {
             Ok(less) => less,
-            Err(failure) => {
-                return Standing {
-                    effect,
-                    status: Status::Established,
-                    gain: 1.0,
-                    p_value: 0.0,
-                    reason: None,
-                    without: Err(failure.clone()),
-                };
-            }
+            Err(failure) => return Standing::sure(effect, (1.0, 0.0), Err(failure.clone())),
         };
         let of_joint = |losses: &Losses| losses.of_effect(&effect);
         let (crossed_less, with) = (of_joint(&crossed(less)), of_joint(&with));
@@ -137,10 +146,9 @@ pub(super) fn standings(
         let reason = evidence.lack(trials, &problem.settings.establish);
         Standing {
             effect,
-            status: if reason.is_none() {
-                Status::Established
-            } else {
-                Status::Supported
+            status: match reason {
+                None => Status::Established,
+                Some(_) => Status::Supported,
             },
             gain: evidence.gain,
             p_value: evidence.p(&problem.settings.establish),
@@ -157,11 +165,8 @@ pub(super) fn without_each(problem: &Problem<'_>, chosen: &Trial) -> Vec<Result<
         let fitted = problem.without_effect(&chosen.fitted, k)?;
         Ok(Trial::of(problem, fitted))
     };
-    problem
-        .added(&chosen.fitted.model)
-        .into_par_iter()
-        .map(less)
-        .collect()
+    let added = problem.added(&chosen.fitted.model);
+    added.into_par_iter().map(less).collect()
 }
 
 /// The evidence for one effect, given the others.

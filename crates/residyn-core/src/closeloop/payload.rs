@@ -10,7 +10,7 @@ use super::fitted::Fitted;
 use super::problem::Problem;
 use crate::data::Joint;
 use crate::identify::Fit;
-use crate::model::{Effect, Entry, FittedEffect, Status};
+use crate::model::{Effect, Entry, FittedEffect};
 
 /// The cost of a fit, including that of its prior.
 fn whole(fit: &Fit) -> f64 {
@@ -48,14 +48,8 @@ impl Problem<'_> {
             && p_value < settings.false_alarm;
         let effect = with.model.effects.last()?.clone();
         is_clear.then(|| {
-            let standing = Standing {
-                effect,
-                status: Status::Established,
-                gain: saved / whole(&chosen.fit),
-                p_value,
-                reason: None,
-                without: Ok(chosen.clone()),
-            };
+            let evidence = (saved / whole(&chosen.fit), p_value);
+            let standing = Standing::sure(effect, evidence, Ok(chosen.clone()));
             (with, standing)
         })
     }

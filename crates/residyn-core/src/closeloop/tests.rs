@@ -239,14 +239,8 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     let chosen = problem.refit(&start, start_states, None).unwrap();
     let refined = refined(&problem, &chosen, &chosen);
     let scorer = study.scorer(&test);
-    let standing = Standing {
-        effect: chosen.model.effects[0].clone(),
-        status: Status::Established,
-        gain: 1.0,
-        p_value: 0.0,
-        reason: None,
-        without: problem.without_effect(&chosen, 0),
-    };
+    let effect = chosen.model.effects[0].clone();
+    let standing = Standing::sure(effect, (1.0, 0.0), problem.without_effect(&chosen, 0));
     let chosen = Chosen {
         after: chosen,
         standings: vec![standing],

@@ -64,9 +64,8 @@ impl<'a> Columns<'a> {
         let bodies = declared.inertias();
         let place = |column: &Column| {
             let of = |body: &[usize; PARTS]| body.iter().position(|p| *p == column.parameter);
-            (0..)
-                .zip(&bodies)
-                .find_map(|(b, body)| Some((b, of(body)?)))
+            let mut bodies = (0..).zip(&bodies);
+            bodies.find_map(|(b, body)| Some((b, of(body)?)))
         };
         Self {
             fit,
@@ -192,10 +191,8 @@ const ROWS: usize = 64;
 fn identifiable_at_most(columns: &Columns<'_>) -> usize {
     let is_of_body = |i: &usize| columns.places[*i].is_some();
     let own: Vec<usize> = (0..columns.places.len()).filter(is_of_body).collect();
-    let active: Vec<usize> = own
-        .iter()
-        .map(|i| columns.fit.columns[*i].parameter)
-        .collect();
+    let parameters = own.iter().map(|i| columns.fit.columns[*i].parameter);
+    let active: Vec<usize> = parameters.collect();
     let tangent = Tangent::new(columns.dynamics, &active, Local::Nothing);
     let values = columns.dynamics.values();
     let mut tape = (tangent.program).tape_at::<f64, LANES>(tangent.first_parameter, values);

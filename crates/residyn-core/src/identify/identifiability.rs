@@ -64,13 +64,12 @@ pub fn identifiability(
     let loose = loose_directions(&information);
     let undetermined = loose
         .iter()
-        .map(|direction| named(dynamics, fit, direction))
-        .collect();
+        .map(|direction| named(dynamics, fit, direction));
     let (hold, still_loose) = hold(&information, fit, readiness);
     Identifiability {
         free: fit.columns.len(),
         determined: fit.columns.len() - hold.len() - still_loose,
-        undetermined,
+        undetermined: undetermined.collect(),
         hold,
     }
 }

@@ -201,10 +201,8 @@ fn reading(dynamics: &Dynamics, active: &[usize]) -> Option<Program> {
     let names = dynamics.program.inputs();
     let inputs: Vec<_> = names.iter().map(|name| graph.input(name)).collect();
     let shown = graph.append(dynamics.reading.as_ref()?, &inputs);
-    let parameters: Vec<_> = active
-        .iter()
-        .map(|&k| inputs[layout.parameters() + k])
-        .collect();
+    let parameters = active.iter().map(|k| inputs[layout.parameters() + k]);
+    let parameters: Vec<_> = parameters.collect();
     let by_state = graph.jacobian(&shown, &inputs[layout.states()]).concat();
     let by_parameter = graph.jacobian(&shown, &parameters).concat();
     Some(graph.finish(&[shown, by_state, by_parameter].concat()))
@@ -397,10 +395,8 @@ impl<'t> TangentStepper<'t> {
     #[inline(always)]
     fn move_with_new_velocities<S: Simd>(&mut self, simd: S, h: &Lane) {
         let n = self.tangent.joints;
-        let columns = self
-            .now
-            .chunks_exact(2 * n)
-            .zip(self.sum.chunks_exact_mut(2 * n));
+        let columns = self.sum.chunks_exact_mut(2 * n);
+        let columns = self.now.chunks_exact(2 * n).zip(columns);
         for (now, sum) in columns {
             for part in 0..Lane::parts::<S>() {
                 for j in 0..n {

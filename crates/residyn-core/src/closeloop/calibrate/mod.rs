@@ -72,9 +72,8 @@ fn hidden(limit: &DetectionLimit, multiple: f64) -> Option<FittedEffect> {
     let mut hidden = limit.effect.clone();
     hidden.values = values.iter().map(|value| (*value, None)).collect();
     hidden.values[*switch].0 *= multiple;
-    COMMON
-        .contains(&hidden.effect.name.as_str())
-        .then_some(hidden)
+    let is_common = COMMON.contains(&hidden.effect.name.as_str());
+    is_common.then_some(hidden)
 }
 
 /// An effect that the search established.
@@ -156,17 +155,16 @@ impl<'a> Calibrator<'a> {
         let common = limits.iter().filter_map(|limit| hidden(limit, multiple));
         let all = std::iter::repeat_n(None, runs).chain(common.map(Some));
         let seed = rng.random();
+        let simulation = |(number, hidden)| Simulation {
+            number,
+            seed,
+            hidden,
+        };
         Ok(Self {
             problem,
             declared: accepted.model.clone(),
             simulated: SimulatedLogs::new(problem, accepted)?,
-            simulations: (all.enumerate())
-                .map(|(number, hidden)| Simulation {
-                    number,
-                    seed,
-                    hidden,
-                })
-                .collect(),
+            simulations: all.enumerate().map(simulation).collect(),
             limits,
         })
     }

@@ -39,12 +39,8 @@ pub(in crate::closeloop) fn residual_force(
     let logs = problem.logs.iter();
     let torques: Vec<Vec<Vec<f64>>> = logs.map(|log| fitted.model.drive_torques(log)).collect();
     let sample = |(window, force): (&Window, &Vec<f64>)| {
-        ForceSample::over(
-            window,
-            &problem.logs[window.log],
-            &torques[window.log],
-            force,
-        )
+        let (log, tau) = (&problem.logs[window.log], &torques[window.log]);
+        ForceSample::over(window, log, tau, force)
     };
     let blocks = shooting.windows.iter().zip(&forces);
     let mut samples: Vec<ForceSample> = blocks.map(sample).collect();

@@ -21,14 +21,9 @@ impl ResidualForce {
         fitted: &Fitted,
     ) -> Result<Self, FitError> {
         let samples = residual_force(problem, fitted)?;
-        Ok(Self {
-            curves: curves(
-                &samples,
-                &problem.declared.prismatic,
-                &problem.settings.curves,
-            ),
-            samples,
-        })
+        let prismatic = &problem.declared.prismatic;
+        let curves = curves(&samples, prismatic, &problem.settings.curves);
+        Ok(Self { samples, curves })
     }
 
     /// Root mean square over blocks and joints, with outliers limited to three times the median, in N m (or N).

@@ -93,14 +93,12 @@ pub fn unexplained(
 ) -> Unexplained {
     let omnibus = omnibus(problem, before, after, rng);
     let losses = Losses::by(problem, &Folds::of(problem).alone(), after);
-    let probed: Vec<Probed> = acting(problem, probes)
-        .into_par_iter()
-        .filter_map(|probe| ask(problem, after, probe, &losses))
-        .collect();
+    let ask = |probe| ask(problem, after, probe, &losses);
+    let probes = acting(problem, probes).into_par_iter();
+    let probed: Vec<Probed> = probes.filter_map(ask).collect();
     let asked = probed.len().max(1) as f64;
-    let seen = probed
-        .iter()
-        .filter(|p| p.gain > problem.settings.diagnostics.noteworthy_share);
+    let noteworthy = problem.settings.diagnostics.noteworthy_share;
+    let seen = probed.iter().filter(|p| p.gain > noteworthy);
     let least = seen.map(|p| p.p_value).fold(1.0, f64::min);
     let (place, joint) = place(problem, &omnibus, &probed);
     Unexplained {

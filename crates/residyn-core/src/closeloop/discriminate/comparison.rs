@@ -42,17 +42,9 @@ fn refit(
     shooting: &Shooting<'_>,
     start_states: Vec<Vec<f64>>,
 ) -> Option<(Values, Fit)> {
-    let active = free_parameters(dynamics);
+    let (solver, active) = (problem.solver, free_parameters(dynamics));
     let scale = Some(problem.settings.discriminate.refit_scale);
-    fit_by(
-        problem.solver,
-        shooting,
-        dynamics,
-        &active,
-        start_states,
-        scale,
-    )
-    .ok()
+    fit_by(solver, shooting, dynamics, &active, start_states, scale).ok()
 }
 
 /// Two explanations: one is simulated as the truth, and the other is fitted to it.
