@@ -190,11 +190,8 @@ fn a_fit_that_fails_allows_no_verdict() {
     let of = |found: &Found<'_>, refined: &_| verdict(found, refined, &errors);
     assert_eq!(of(&found, &finer).0, Verdict::Explained);
 
-    let mut failed = refined(
-        &found.problem,
-        &found.before,
-        &diverging(found.chosen.after.clone()),
-    );
+    let diverged = diverging(found.chosen.after.clone());
+    let mut failed = refined(&found.problem, &found.before, &diverged);
     assert!(matches!(failed.failure, Some(FitError::Diverged { .. })));
     failed.after = finer.after.clone();
     let (answer, reason) = of(&found, &failed);

@@ -59,11 +59,16 @@ impl<'l> Shooting<'l> {
         let half_widths = half_widths(logs);
         let pack = |chunk| Pack::new(logs, &windows, chunk, noise, &half_widths);
         let packs = order.chunks(LANES).map(pack).collect();
+        let measure = Measure::Motion(Arc::new(packs));
+        Self::of(logs, windows, noise, measure)
+    }
+
+    fn of(logs: &'l [Log], windows: Vec<Window>, noise: &[f64], measure: Measure) -> Self {
         Self {
             logs,
             windows,
             noise: noise.to_vec(),
-            measure: Measure::Motion(Arc::new(packs)),
+            measure,
             prior: Prior::default(),
             cuts: Arc::default(),
         }
@@ -94,19 +99,9 @@ impl<'l> Shooting<'l> {
         let within = |window: &Window| rows[window.log].within(&logs[window.log], window);
         windows.retain(|window| !within(window).is_empty());
         let order: Vec<usize> = (0..windows.len()).collect();
-        let packs = order.chunks(LANES);
-        let packs = packs.map(|chunk| Balance::new(logs, &rows, &windows, chunk, noise));
-        Self {
-            logs,
-            noise: noise.to_vec(),
-            measure: Measure::Torques {
-                packs: Arc::new(packs.collect()),
-                rows,
-            },
-            windows,
-            prior: Prior::default(),
-            cuts: Arc::default(),
-        }
+        let pack = |chunk| Balance::new(logs, &rows, &windows, chunk, noise);
+        let packs = Arc::new(order.chunks(LANES).map(pack).collect());
+        Self::of(logs, windows, noise, Measure::Torques { rows, packs })
     }
 
     /// The logs cut into windows of this length in s; each length is cut only once, however often it is requested.

@@ -103,35 +103,30 @@ struct Sum {
 
 /// The sum with one more term, the one that lowers the loss most.
 fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -> Option<Sum> {
-    let mut screened: Vec<(Vec<Term>, FittedEffect, f64)> = TERMS
-        .par_iter()
-        .filter(|term| !terms.contains(term))
-        .filter_map(|term| {
-            let terms = [terms, &[*term]].concat();
-            let effect = effect(&terms);
-            if !problem.error_model.shows(&effect) {
-                return None;
-            }
-            let effect = FittedEffect::absent(&effect, joint);
-            let start = best_start(problem, model, &effect)?;
-            let cost = screened_cost(problem, model, &start)?;
-            Some((terms, start, cost))
-        })
-        .collect();
+    let screen = |term: &Term| {
+        let terms = [terms, &[*term]].concat();
+        let effect = effect(&terms);
+        if !problem.error_model.shows(&effect) {
+            return None;
+        }
+        let start = best_start(problem, model, &FittedEffect::absent(&effect, joint))?;
+        let cost = screened_cost(problem, model, &start)?;
+        Some((terms, start, cost))
+    };
+    let others = TERMS.par_iter().filter(|term| !terms.contains(term));
+    let mut screened: Vec<(Vec<Term>, FittedEffect, f64)> = others.filter_map(screen).collect();
     screened.sort_by(|a, b| a.2.total_cmp(&b.2));
     screened.truncate(problem.settings.proposal.fitted_terms);
-    let fitted: Vec<Sum> = screened
-        .into_par_iter()
-        .filter_map(|(terms, start, _)| {
-            let longer = model.effects_and(&[start]);
-            let fitted = problem.with_effects(model, longer).ok()?;
-            Some(Sum {
-                terms,
-                losses: Losses::of(problem, &fitted).of_joint(joint),
-                effect: fitted.model.effects.last()?.clone(),
-            })
+    let fit = |(terms, start, _): (Vec<Term>, FittedEffect, f64)| {
+        let longer = model.effects_and(&[start]);
+        let fitted = problem.with_effects(model, longer).ok()?;
+        Some(Sum {
+            terms,
+            losses: Losses::of(problem, &fitted).of_joint(joint),
+            effect: fitted.model.effects.last()?.clone(),
         })
-        .collect();
+    };
+    let fitted: Vec<Sum> = screened.into_par_iter().filter_map(fit).collect();
     let loss = |sum: &Sum| sum.losses.iter().sum::<f64>();
     (fitted.into_iter()).min_by(|a, b| loss(a).total_cmp(&loss(b)))
 }
