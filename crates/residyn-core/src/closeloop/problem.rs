@@ -3,7 +3,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::error_model::ErrorModel;
 use super::fitted::Fitted;
-use super::settings::{FitSettings, Settings};
+use super::settings::Settings;
 use super::smoothing::width;
 use super::split::by_numbers;
 use crate::data::{Audit, JointAudit, Log, audit};
@@ -94,12 +94,6 @@ impl<'a> Problem<'a> {
         (logs, audits): (&'a [Log], Vec<Audit>),
         settings: &'a Settings,
     ) -> Self {
-        let FitSettings {
-            window_s,
-            sample_windows,
-            smoothing_velocity_share,
-            ..
-        } = settings.fit;
         let top = |f: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
             (0..declared.joints)
                 .map(|j| (0..logs.len()).map(|l| f(l, j)).fold(0.0, f64::max))
@@ -117,7 +111,7 @@ impl<'a> Problem<'a> {
             let rounding = channel.resolution / 12.0_f64.sqrt();
             channel.noise_std.max(rounding).max(1e-9)
         });
-        let of_joint = |top: &f64| width(smoothing_velocity_share, *top);
+        let of_joint = |top: &f64| width(settings.fit.smoothing_velocity_share, *top);
         let by_speed = || top_speed.iter().map(of_joint).collect();
         let smoothing_velocities: Vec<f64> =
             declared.smoothing_velocity.clone().unwrap_or_else(by_speed);
@@ -126,8 +120,8 @@ impl<'a> Problem<'a> {
             ErrorModel::OutputError => noise,
             ErrorModel::InverseDynamics => vec![1.0; declared.joints],
         };
-        let shooting =
-            error_model.shooting(logs, cut(logs, window_s), &noise, &smoothing_velocities);
+        let windows = cut(logs, settings.fit.window_s);
+        let shooting = error_model.shooting(logs, windows, &noise, &smoothing_velocities);
         let shooting = shooting.near(declared);
         Self {
             declared,
@@ -138,7 +132,7 @@ impl<'a> Problem<'a> {
             logs,
             audits: Arc::new(audits.into()),
             smoothing_velocities,
-            sample: Sample::of(&shooting, sample_windows),
+            sample: Sample::of(&shooting, settings.fit.sample_windows),
             shooting,
             top_speed,
             top_torque,

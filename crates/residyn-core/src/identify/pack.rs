@@ -62,8 +62,8 @@ impl Pack {
             start: vec![Row::splat(0.0); 2 * n],
             start_weight: vec![Row::splat(0.0); 2 * n],
         };
-        for (lane, &member) in members.iter().enumerate() {
-            let window = windows[member];
+        for lane in 0..members.len() {
+            let window = window_of(lane);
             let (log, half_width) = (&logs[window.log], half_widths[window.log]);
             let start = Start::of(log, window.first, half_width, noise);
             for k in 0..2 * n {
@@ -78,11 +78,8 @@ impl Pack {
                 let at = (window.first + row).min(window.last);
                 pack.at[row][lane] = at;
                 pack.time[row][lane] = log.time[at];
-                pack.dt[row][lane] = if at < window.last {
-                    log.time[at + 1] - log.time[at]
-                } else {
-                    0.0
-                };
+                // Padding has steps of zero length.
+                pack.dt[row][lane] = log.time[(at + 1).min(window.last)] - log.time[at];
                 for j in 0..n {
                     pack.tau[row][j][lane] = log.tau[j][at];
                     pack.q[row][j][lane] = log.q[j][at];

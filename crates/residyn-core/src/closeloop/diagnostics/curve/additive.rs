@@ -32,14 +32,14 @@ impl Additive {
         let rows = forces.len();
         let mut design = DMatrix::from_element(rows, 1 + SPLINES * bases.len(), 1.0);
         for (k, basis) in bases.iter().enumerate() {
-            design
-                .columns_mut(1 + SPLINES * k, SPLINES)
-                .copy_from(&basis.columns);
+            let mut own = design.columns_mut(1 + SPLINES * k, SPLINES);
+            own.copy_from(&basis.columns);
         }
         let even = DVector::from_element(rows, 1.0);
         let first = Sums::by_block(&design, forces, &even, blocks);
         let penalties = smoothness(&first, bases.len(), rows, settings)?;
-        let rough = solve(&Sums::total(&first), &penalties)?.solve(&Sums::total(&first).right);
+        let total = Sums::total(&first);
+        let rough = solve(&total, &penalties)?.solve(&total.right);
         let weights = weights(&(forces - &design * rough), settings.huber_scales);
         let parts = Sums::by_block(&design, forces, &weights, blocks);
         let penalties = smoothness(&parts, bases.len(), rows, settings)?;
@@ -126,34 +126,24 @@ fn smoothness(
     rows: usize,
     settings: &CurveSettings,
 ) -> Option<DMatrix<f64>> {
-    let CurveSettings {
-        folds,
-        penalty_exponents: penalties,
-        rounds,
-        ..
-    } = settings;
-    let left_out: Vec<Sums> = (0..parts.len().min(*folds))
-        .map(|fold| {
-            let members: Vec<Sums> = parts.iter().skip(fold).step_by(*folds).cloned().collect();
-            Sums::total(&members)
-        })
-        .collect();
+    let (folds, penalties) = (settings.folds, &settings.penalty_exponents);
+    let of_fold = |fold: usize| {
+        let members: Vec<Sums> = parts.iter().skip(fold).step_by(folds).cloned().collect();
+        Sums::total(&members)
+    };
+    let left_out: Vec<Sums> = (0..parts.len().min(folds)).map(of_fold).collect();
     let total = Sums::total(parts);
     let rests: Vec<Sums> = left_out.iter().map(|part| total.without(part)).collect();
     let error = |powers: &[i32]| -> f64 {
         let penalty = penalty(powers, rows);
-        let fitted = rests.iter().map(|rest| solve(rest, &penalty));
-        fitted
-            .zip(&rests)
-            .zip(&left_out)
-            .map(|((solver, rest), part)| match solver {
-                Some(solver) => part.error(&solver.solve(&rest.right)),
-                None => f64::INFINITY,
-            })
-            .sum()
+        let error = |(rest, part): (&Sums, &Sums)| match solve(rest, &penalty) {
+            Some(solver) => part.error(&solver.solve(&rest.right)),
+            None => f64::INFINITY,
+        };
+        rests.iter().zip(&left_out).map(error).sum()
     };
     let mut powers = vec![penalties[penalties.len() / 2]; variables];
-    for k in (0..variables).cycle().take(rounds * variables) {
+    for k in (0..variables).cycle().take(settings.rounds * variables) {
         let tried = penalties.iter().map(|power| {
             let mut powers = powers.clone();
             powers[k] = *power;

@@ -25,9 +25,8 @@ impl Basis {
         }
         let mut columns = DMatrix::zeros(values.len(), SPLINES);
         for (row, value) in values.iter().enumerate() {
-            columns
-                .row_mut(row)
-                .copy_from_slice(&splines((value - low) / (high - low)));
+            let splines = splines((value - low) / (high - low));
+            columns.row_mut(row).copy_from_slice(&splines);
         }
         let means: Vec<f64> = columns.column_iter().map(|column| column.mean()).collect();
         for (mut column, mean) in columns.column_iter_mut().zip(&means) {
@@ -50,10 +49,8 @@ impl Basis {
     /// The centred splines at a value.
     pub fn at(&self, value: f64) -> impl Iterator<Item = f64> {
         let splines = splines((value - self.low) / (self.high - self.low));
-        splines
-            .into_iter()
-            .zip(&self.means)
-            .map(|(b, mean)| b - mean)
+        let both = splines.into_iter().zip(&self.means);
+        both.map(|(b, mean)| b - mean)
     }
 }
 
