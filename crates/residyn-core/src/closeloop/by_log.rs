@@ -33,9 +33,7 @@ impl Problem<'_> {
             let fitted = self.fitted_to(log, chosen);
             OfLog {
                 log: log.name(),
-                errors: fitted
-                    .as_ref()
-                    .map_or_else(|_| Vec::new(), |f| self.crossed(f)),
+                errors: (fitted.as_ref()).map_or_else(|_| Vec::new(), |f| self.crossed(f)),
                 fitted,
             }
         };
@@ -55,10 +53,9 @@ impl Problem<'_> {
     }
 
     fn crossed(&self, fitted: &Fitted) -> Vec<f64> {
-        let logs = if self.logs.len() > self.settings.score.most_logs_crossed {
-            &[]
-        } else {
-            self.logs
+        let logs = match self.logs.len() > self.settings.score.most_logs_crossed {
+            true => &[],
+            false => self.logs,
         };
         let error = |log| {
             let scorer = Scorer {

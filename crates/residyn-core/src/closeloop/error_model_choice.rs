@@ -22,16 +22,10 @@ impl Problem<'_> {
     fn tells_more_of_torques(&self) -> Option<bool> {
         let own = &self.declared.effects;
         let friction = baseline_friction(self);
-        let model = self
-            .declared
-            .with_effects([own, friction.as_slice()].concat());
-        let fitted = fit_torques(
-            self.solver,
-            &self.smoothed(&model),
-            self.declared,
-            self.logs,
-        )
-        .ok()?;
+        let effects = [own, friction.as_slice()].concat();
+        let model = self.declared.with_effects(effects);
+        let smoothed = self.smoothed(&model);
+        let fitted = fit_torques(self.solver, &smoothed, self.declared, self.logs).ok()?;
         let torque = torque_error(&fitted.model, self.logs)?.relative;
         if self.declared.joints > self.settings.fit.most_joints_by_motion {
             return Some(true);
@@ -61,10 +55,8 @@ impl Problem<'_> {
             let way = |window: &Window| way(&self.logs[window.log], window, j);
             let ways: Vec<f64> = windows.iter().map(way).collect();
             let farthest = ways.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-            let moving = errors
-                .iter()
-                .zip(&ways)
-                .filter(|(_, way)| **way > self.settings.fit.at_rest_share * farthest);
+            let least = self.settings.fit.at_rest_share * farthest;
+            let moving = errors.iter().zip(&ways).filter(|(_, way)| **way > least);
             let shares: Vec<f64> = moving.map(|(error, way)| error.position[j] / way).collect();
             (!shares.is_empty()).then(|| upper_median(&shares))
         };

@@ -28,6 +28,24 @@ pub struct Standing {
     pub without: Result<Fitted, FitError>,
 }
 
+impl Standing {
+    /// An effect that nothing speaks against, with its gain and p-value, and the model refitted without it.
+    pub(super) fn sure(
+        effect: FittedEffect,
+        (gain, p_value): (f64, f64),
+        without: Result<Fitted, FitError>,
+    ) -> Self {
+        Self {
+            effect,
+            status: Status::Established,
+            gain,
+            p_value,
+            reason: None,
+            without,
+        }
+    }
+}
+
 /// The set of effects that was chosen.
 pub struct Chosen {
     /// The model with them, fitted.
@@ -46,10 +64,13 @@ pub struct Chosen {
 impl Chosen {
     /// Number of established effects.
     pub fn established(&self) -> usize {
-        let standings = self.standings.iter();
-        standings
-            .filter(|s| s.status == Status::Established)
-            .count()
+        self.named().count()
+    }
+
+    /// The established effects.
+    pub(super) fn named(&self) -> impl Iterator<Item = &FittedEffect> {
+        let established = |s: &&Standing| s.status == Status::Established;
+        self.standings.iter().filter(established).map(|s| &s.effect)
     }
 }
 
@@ -61,22 +82,19 @@ pub fn establish(
     selected: Selected,
     watch: &dyn Watch,
 ) -> Chosen {
-    let Selected {
-        chosen,
-        rounds,
-        stopped,
-    } = selected;
-    let chosen = match chosen {
+    let none = Chosen {
+        after: before.clone(),
+        standings: Vec::new(),
+        rounds: selected.rounds,
+        stopped: selected.stopped,
+        rivals: Vec::new(),
+        failure: None,
+    };
+    let chosen = match selected.chosen {
         Ok(chosen) => chosen,
         Err(failure) => {
-            return Chosen {
-                after: before.clone(),
-                standings: Vec::new(),
-                rounds,
-                stopped,
-                rivals: Vec::new(),
-                failure: Some(failure),
-            };
+            let failure = Some(failure);
+            return Chosen { failure, ..none };
         }
     };
     watch.see(Stage::Establish.into());
@@ -87,17 +105,15 @@ pub fn establish(
     let established: Vec<bool> = (standings.iter())
         .map(|standing| standing.status == Status::Established)
         .collect();
+    let rivals = match watch.has_to_end() {
+        true => Vec::new(),
+        false => rivals(problem, &chosen, &without, &established),
+    };
     Chosen {
-        rivals: if watch.has_to_end() {
-            Vec::new()
-        } else {
-            rivals(problem, &chosen, &without, &established)
-        },
+        rivals,
         standings,
-        rounds,
-        stopped,
         after: chosen.fitted,
-        failure: None,
+        ..none
     }
 }
 
@@ -117,16 +133,7 @@ pub(super) fn standings(
         let effect = chosen.fitted.model.effects[k].clone();
         let less = match less {
             Ok(less) => less,
-            Err(failure) => {
-                return Standing {
-                    effect,
-                    status: Status::Established,
-                    gain: 1.0,
-                    p_value: 0.0,
-                    reason: None,
-                    without: Err(failure.clone()),
-                };
-            }
+            Err(failure) => return Standing::sure(effect, (1.0, 0.0), Err(failure.clone())),
         };
         let of_joint = |losses: &Losses| losses.of_effect(&effect);
         let (crossed_less, with) = (of_joint(&crossed(less)), of_joint(&with));
@@ -139,10 +146,9 @@ pub(super) fn standings(
         let reason = evidence.lack(trials, &problem.settings.establish);
         Standing {
             effect,
-            status: if reason.is_none() {
-                Status::Established
-            } else {
-                Status::Supported
+            status: match reason {
+                None => Status::Established,
+                Some(_) => Status::Supported,
             },
             gain: evidence.gain,
             p_value: evidence.p(&problem.settings.establish),
@@ -159,11 +165,8 @@ pub(super) fn without_each(problem: &Problem<'_>, chosen: &Trial) -> Vec<Result<
         let fitted = problem.without_effect(&chosen.fitted, k)?;
         Ok(Trial::of(problem, fitted))
     };
-    problem
-        .added(&chosen.fitted.model)
-        .into_par_iter()
-        .map(less)
-        .collect()
+    let added = problem.added(&chosen.fitted.model);
+    added.into_par_iter().map(less).collect()
 }
 
 /// The evidence for one effect, given the others.
@@ -193,7 +196,6 @@ impl Evidence {
 
     /// What is missing for the effect to be established.
     fn lack(&self, trials: usize, settings: &EstablishSettings) -> Option<String> {
-        #[allow(clippy::cast_precision_loss)] // few trials
         let level = settings.false_alarm / trials.max(1) as f64;
         let p = self.p(settings);
         let significant = self.p_alone() < level

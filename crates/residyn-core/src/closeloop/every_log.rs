@@ -30,10 +30,8 @@ impl<'l> EveryLog<'l> {
             let without = errors(without, log);
             matches!((with, without), (Some(with), Some(without)) if of_effect(with) < of_effect(&without))
         };
-        self.errors
-            .iter()
-            .find(|of_log| !helps(of_log))
-            .map(|(log, _)| *log)
+        let found = self.errors.iter().find(|of_log| !helps(of_log));
+        found.map(|(log, _)| *log)
     }
 }
 

@@ -53,10 +53,8 @@ fn pushes(
         adjacent && is_far(a) && is_far(b)
     };
     let push = |run: &[ForceSample]| {
-        let largest = run
-            .iter()
-            .map(|sample| force(sample).abs())
-            .fold(0.0, f64::max);
+        let sizes = run.iter().map(|sample| force(sample).abs());
+        let largest = sizes.fold(0.0, f64::max);
         let is_push = run.len() >= settings.external_force_blocks
             && largest > least.max(settings.push_deviations * deviation);
         is_push.then(|| ExternalForce {

@@ -9,6 +9,7 @@ use super::fitted::Fitted;
 use super::prepare::Prepared;
 use super::problem::Problem;
 use super::select::baseline_friction;
+use super::smoothing::width;
 use super::stage::{Stage, Watch};
 use super::start::around;
 use crate::identify::{
@@ -93,12 +94,8 @@ impl<'a> Problem<'a> {
         let own = &self.declared.effects;
         let model = self.declared.with_effects([own, friction].concat());
         let problem = self.with_smoothing_velocities(self.best_smoothing_velocities(&model)?);
-        let beside = fit_torques(
-            self.solver,
-            &problem.smoothed(&model),
-            self.declared,
-            self.logs,
-        )?;
+        let smoothed = problem.smoothed(&model);
+        let beside = fit_torques(self.solver, &smoothed, self.declared, self.logs)?;
         // The logs there are already smoothed as needed here.
         let windows = cut(self.logs, self.settings.fit.window_s);
         let problem = problem.over(beside.shooting.over(windows));
@@ -116,11 +113,8 @@ impl<'a> Problem<'a> {
             return Ok(best);
         }
         let fitted = |share: &f64| {
-            let widths: Vec<f64> = self
-                .top_speed
-                .iter()
-                .map(|top| share * top.max(1e-6))
-                .collect();
+            let of_joint = |top: &f64| width(*share, *top);
+            let widths: Vec<f64> = self.top_speed.iter().map(of_joint).collect();
             let model = model.with_smoothing_velocities(widths.clone());
             let found = fit_torques(self.solver, &model, self.declared, self.logs)?;
             Ok((found.shooting.noise, widths))
@@ -138,9 +132,8 @@ impl<'a> Problem<'a> {
     /// The best of a few fits that begin at values around the declared ones, and where it began.
     fn fitted_around(&self, friction: &[FittedEffect]) -> Option<(Model, ByMotion)> {
         let fit = |start: Model| Some((self.fitted_from(&start, friction).ok()?, start));
-        let found = around(self)
-            .filter_map(fit)
-            .take(self.settings.fit.fitted_starts);
+        let found = around(self).filter_map(fit);
+        let found = found.take(self.settings.fit.fitted_starts);
         let (found, start) = found.min_by(|(a, _), (b, _)| cost(a).total_cmp(&cost(b)))?;
         Some((start, found))
     }
@@ -205,17 +198,15 @@ impl<'a> Problem<'a> {
     }
 
     fn fitted_over(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fitted, FitError> {
-        let model = self.smoothed(model);
-        let dynamics = self.error_model.compile(&model);
-        let start_states = shooting.initial_start_states(0);
-        let found = fit_windows(
-            shooting,
-            &dynamics,
-            &self.active(&dynamics),
-            start_states,
-            None,
-        )?;
-        Ok(Fitted::new(&model, &dynamics, found, self.logs))
+        self.fitted_by(model, |dynamics, active| {
+            fit_windows(
+                shooting,
+                dynamics,
+                active,
+                shooting.initial_start_states(0),
+                None,
+            )
+        })
     }
 
     /// What the logs determine of the declared parameters and of the file's effects, together with all effects of a
@@ -228,10 +219,9 @@ impl<'a> Problem<'a> {
         let mut verdict = identifiability(&dynamics, self.readiness(), &values, &fitted.fit);
         let known = verdict.hold.len() + verdict.determined;
         // Combinations that are neither determined nor held belong to bodies or, without bodies, to effects.
-        let open = if bodies.is_empty() {
-            0
-        } else {
-            verdict.free - known
+        let open = match bodies.is_empty() {
+            true => 0,
+            false => verdict.free - known,
         };
         let columns = fitted.fit.columns.iter();
         verdict.free = columns.filter(|column| column.parameter < end).count();

@@ -19,10 +19,8 @@ pub(super) fn report_gravity(
 ) {
     for (share, audit) in shares.iter().zip(audits) {
         if let Some(share) = share.filter(|share| contradicts(*share, settings)) {
-            let text = format!(
-                "{}. Effects fitted to them imitate the difference",
-                message(share)
-            );
+            let share = message(share);
+            let text = format!("{share}. Effects fitted to them imitate the difference");
             audit.add(Finding::new(Severity::Serious, text));
         }
     }
@@ -33,13 +31,9 @@ pub(super) fn report_gravity(
 pub(super) fn against_gravity(shares: &[Option<f64>], settings: &NoteSettings) -> Option<String> {
     let mut shares: Vec<f64> = shares.iter().copied().flatten().collect();
     shares.sort_by(f64::total_cmp);
-    let median = shares
-        .get(shares.len() / 2)
-        .filter(|share| contradicts(**share, settings))?;
-    Some(format!(
-        "{}; effects would imitate the difference",
-        message(*median)
-    ))
+    let median = shares.get(shares.len() / 2).copied();
+    let median = message(median.filter(|share| contradicts(*share, settings))?);
+    Some(format!("{median}; effects would imitate the difference"))
 }
 
 fn contradicts(share: f64, settings: &NoteSettings) -> bool {

@@ -132,13 +132,11 @@ impl Chosen {
 /// Demote established effects to supported if there is a reason.
 fn demote(standings: &mut [Standing], reason: impl Fn(&Standing) -> Option<String> + Sync) {
     let established = |standing: &&mut Standing| standing.status == Status::Established;
-    standings
-        .par_iter_mut()
-        .filter(established)
-        .for_each(|standing| {
-            if let Some(reason) = reason(standing) {
-                standing.status = Status::Supported;
-                standing.reason = Some(reason);
-            }
-        });
+    let judge = |standing: &mut Standing| {
+        if let Some(reason) = reason(standing) {
+            standing.status = Status::Supported;
+            standing.reason = Some(reason);
+        }
+    };
+    (standings.par_iter_mut().filter(established)).for_each(judge);
 }

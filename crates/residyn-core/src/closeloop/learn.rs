@@ -199,7 +199,6 @@ fn parts(logs: &[Log], count: usize) -> Vec<Vec<Log>> {
         let of = |part: usize| logs.iter().skip(part).step_by(count).cloned().collect();
         return (0..count).map(of).collect();
     }
-    #[allow(clippy::cast_precision_loss)] // few parts
     let piece = |log: &Log, part: usize| {
         let at = |k: usize| log.time[0] + log.duration() * k as f64 / count as f64;
         between(log, at(part), at(part + 1))

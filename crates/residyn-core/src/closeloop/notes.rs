@@ -20,22 +20,18 @@ pub(super) fn noted(
     usual: Option<&Fitted>,
     diagnostics: &Diagnostics,
 ) -> (Vec<Audit>, Vec<String>) {
-    let problem = &found.problem;
+    let (problem, settings) = (&found.problem, &found.problem.settings.notes);
     let [mut of_train, mut of_test] =
         [&prepared.train, &prepared.test].map(|ready| ready.audits.clone());
     problem.report_reversed(usual, &mut of_train);
-    report_gravity(&found.gravity, &problem.settings.notes, &mut of_train);
+    report_gravity(&found.gravity, settings, &mut of_train);
     report_too_many(problem, &mut of_train);
     // Logs on which the model diverges cannot show external forces.
     if let Ok(residual) = &diagnostics.after {
         report_external_forces(problem, &residual.samples, &mut of_train);
     }
     let tested = problem.on(&prepared.test.for_fits);
-    report_gravity(
-        &shares_of_gravity(&tested),
-        &problem.settings.notes,
-        &mut of_test,
-    );
+    report_gravity(&shares_of_gravity(&tested), settings, &mut of_test);
     if let Ok(forces) = residual_force(&tested, &found.chosen.after) {
         report_external_forces(&tested, &forces, &mut of_test);
     }
@@ -50,10 +46,8 @@ fn report_fitted_tests(prepared: &Prepared<'_>, audits: &mut [Audit]) -> Vec<Str
     let repeated = report_repeats(train.iter().chain(&**test), audits);
     let of_test = test.iter().zip(&repeated[train.len()..]);
     let is_fitted = |repeated: &Repeated| repeated.is_identical() && repeated.place < train.len();
-    of_test
-        .filter(|(_, repeated)| repeated.as_ref().is_some_and(is_fitted))
-        .map(|(log, _)| log.name())
-        .collect()
+    let fitted = of_test.filter(|(_, repeated)| repeated.as_ref().is_some_and(is_fitted));
+    fitted.map(|(log, _)| log.name()).collect()
 }
 
 /// Report in the first log's audit which effects are not looked for because there are too many logs.

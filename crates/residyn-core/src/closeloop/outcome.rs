@@ -125,21 +125,11 @@ impl Outcome {
 
     /// The problem that was studied, rebuilt for the model and the library that it was studied with.
     pub fn problem<'a>(&'a self, declared: &'a Model, library: &'a Library) -> Problem<'a> {
-        let Given {
-            studied,
-            audits,
-            settings,
-            ..
-        } = &self.given;
-        let audits = audits[..studied.len()].to_vec();
-        Problem::audited(
-            declared,
-            library,
-            self.error_model,
-            (&**studied, audits),
-            settings,
-        )
-        .knowing(self.models.identifiability.clone())
+        let given = &self.given;
+        let audits = given.audits[..given.studied.len()].to_vec();
+        let logs = (&*given.studied, audits);
+        Problem::audited(declared, library, self.error_model, logs, &given.settings)
+            .knowing(self.models.identifiability.clone())
     }
 }
 

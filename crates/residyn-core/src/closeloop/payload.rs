@@ -10,7 +10,7 @@ use super::fitted::Fitted;
 use super::problem::Problem;
 use crate::data::Joint;
 use crate::identify::Fit;
-use crate::model::{Effect, Entry, FittedEffect, Status};
+use crate::model::{Effect, Entry, FittedEffect};
 
 /// The cost of a fit, including that of its prior.
 fn whole(fit: &Fit) -> f64 {
@@ -33,18 +33,13 @@ impl Problem<'_> {
         let is_load = |effect: &&Effect| matches!(effect.entry, Entry::Payload(_));
         let effect = self.effects().iter().find(is_load)?;
         let tip = Joint::at(self.declared.joints - 1);
-        let is_there = chosen
-            .model
-            .effects
-            .iter()
-            .any(|other| other.effect == *effect);
+        let mut present = chosen.model.effects.iter();
+        let is_there = present.any(|other| other.effect == *effect);
         if is_there || self.declared.can_carry(effect, tip).is_err() {
             return None;
         }
-        let starts = self.loads(chosen, effect, tip)?;
-        let fits = starts
-            .into_par_iter()
-            .filter_map(|load| self.loaded(chosen, load));
+        let starts = self.loads(chosen, effect, tip)?.into_par_iter();
+        let fits = starts.filter_map(|load| self.loaded(chosen, load));
         let with = fits.min_by(|a, b| whole(&a.fit).total_cmp(&whole(&b.fit)))?;
         let saved = whole(&chosen.fit) - whole(&with.fit);
         let settings = &self.settings.establish;
@@ -53,14 +48,8 @@ impl Problem<'_> {
             && p_value < settings.false_alarm;
         let effect = with.model.effects.last()?.clone();
         is_clear.then(|| {
-            let standing = Standing {
-                effect,
-                status: Status::Established,
-                gain: saved / whole(&chosen.fit),
-                p_value,
-                reason: None,
-                without: Ok(chosen.clone()),
-            };
+            let evidence = (saved / whole(&chosen.fit), p_value);
+            let standing = Standing::sure(effect, evidence, Ok(chosen.clone()));
             (with, standing)
         })
     }

@@ -53,25 +53,16 @@ pub struct ReadyLogs {
 pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> {
     watch.see(Stage::Audit.into());
     let split = request.divided();
-    let Request {
-        model,
-        library,
-        against,
-        mut settings,
-        error_model,
-        solver,
-        learner,
-        ..
-    } = request;
+    let (model, settings) = (request.model, &mut request.settings);
     let horizons_s = settings.score.horizons_s.drain(..);
     let (scored_s, unscored_s) =
         horizons_s.partition(|horizon_s| window_count(&split.test, *horizon_s) > 0);
     settings.score.horizons_s = scored_s;
-    let split = split.in_order();
+    let (split, window_s) = (split.in_order(), settings.fit.window_s);
     let ready = |logs: Vec<Log>| {
         let mut audits = audit_together(&logs, &model.columns);
         let logs = shortened(logs, &mut audits);
-        let for_fits = logs.iter().map(|log| log.for_fits(settings.fit.window_s));
+        let for_fits = logs.iter().map(|log| log.for_fits(window_s));
         ReadyLogs {
             for_fits: for_fits.collect(),
             logs: logs.into(),
@@ -83,13 +74,13 @@ pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> 
         test: ready(split.test),
         split: split.method,
         model,
-        library,
-        against,
+        library: request.library,
+        against: request.against,
         unscored_s,
-        error_model,
-        solver,
-        learner,
-        settings,
+        error_model: request.error_model,
+        solver: request.solver,
+        learner: request.learner,
+        settings: request.settings,
     }
 }
 
@@ -104,12 +95,9 @@ impl Prepared<'_> {
             return Err(StudyError::TooManyParameters { model, free });
         }
         if self.settings.score.horizons_s.is_empty() {
+            let horizons_s = self.unscored_s.iter().copied();
             return Err(StudyError::NoTest {
-                shortest_s: self
-                    .unscored_s
-                    .iter()
-                    .copied()
-                    .fold(f64::INFINITY, f64::min),
+                shortest_s: horizons_s.fold(f64::INFINITY, f64::min),
                 found: self.serious_in_test(),
             });
         }

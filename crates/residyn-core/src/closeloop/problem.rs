@@ -3,11 +3,13 @@ use std::sync::{Arc, OnceLock};
 
 use super::error_model::ErrorModel;
 use super::fitted::Fitted;
-use super::settings::{FitSettings, Settings};
+use super::settings::Settings;
+use super::smoothing::width;
 use super::split::by_numbers;
 use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{
-    FitError, Identifiability, LevenbergMarquardt, Shooting, Solver, cut, fit_below, fit_by,
+    Fit, FitError, Identifiability, LevenbergMarquardt, Shooting, Solver, Values, cut, fit_below,
+    fit_by, free_parameters,
 };
 use crate::model::{Dynamics, Effect, FittedEffect, Library, Model, Parameter};
 
@@ -80,14 +82,8 @@ impl<'a> Problem<'a> {
         settings: &'a Settings,
     ) -> Self {
         let audits = logs.iter().map(|log| audit(log, &declared.columns));
-        let audits = audits.collect();
-        Self::audited(
-            declared,
-            library,
-            ErrorModel::OutputError,
-            (logs, audits),
-            settings,
-        )
+        let logs = (logs, audits.collect());
+        Self::audited(declared, library, ErrorModel::OutputError, logs, settings)
     }
 
     /// A problem of logs with their audits.
@@ -98,12 +94,6 @@ impl<'a> Problem<'a> {
         (logs, audits): (&'a [Log], Vec<Audit>),
         settings: &'a Settings,
     ) -> Self {
-        let FitSettings {
-            window_s,
-            sample_windows,
-            smoothing_velocity_share,
-            ..
-        } = settings.fit;
         let top = |f: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
             (0..declared.joints)
                 .map(|j| (0..logs.len()).map(|l| f(l, j)).fold(0.0, f64::max))
@@ -118,17 +108,11 @@ impl<'a> Problem<'a> {
         // Encoders finer than their noise show it; coarse ones add quantisation error.
         let noise = top(&|l, j| {
             let channel = &audits[l].joints[j].q;
-            channel
-                .noise_std
-                .max(channel.resolution / 12.0_f64.sqrt())
-                .max(1e-9)
+            let rounding = channel.resolution / 12.0_f64.sqrt();
+            channel.noise_std.max(rounding).max(1e-9)
         });
-        let by_speed = || {
-            top_speed
-                .iter()
-                .map(|speed| smoothing_velocity_share * speed.max(1e-6))
-                .collect()
-        };
+        let of_joint = |top: &f64| width(settings.fit.smoothing_velocity_share, *top);
+        let by_speed = || top_speed.iter().map(of_joint).collect();
         let smoothing_velocities: Vec<f64> =
             declared.smoothing_velocity.clone().unwrap_or_else(by_speed);
         // Torque noise is unknown before the first fit, so start from 1.
@@ -136,8 +120,8 @@ impl<'a> Problem<'a> {
             ErrorModel::OutputError => noise,
             ErrorModel::InverseDynamics => vec![1.0; declared.joints],
         };
-        let shooting =
-            error_model.shooting(logs, cut(logs, window_s), &noise, &smoothing_velocities);
+        let windows = cut(logs, settings.fit.window_s);
+        let shooting = error_model.shooting(logs, windows, &noise, &smoothing_velocities);
         let shooting = shooting.near(declared);
         Self {
             declared,
@@ -148,7 +132,7 @@ impl<'a> Problem<'a> {
             logs,
             audits: Arc::new(audits.into()),
             smoothing_velocities,
-            sample: Sample::of(&shooting, sample_windows),
+            sample: Sample::of(&shooting, settings.fit.sample_windows),
             shooting,
             top_speed,
             top_torque,
@@ -189,32 +173,17 @@ impl<'a> Problem<'a> {
         'a: 'b,
     {
         let windows = cut(logs, self.settings.fit.window_s);
-        let shooting = self
-            .error_model
-            .shooting(
-                logs,
-                windows,
-                &self.shooting.noise,
-                &self.smoothing_velocities,
-            )
-            .near(self.declared);
+        let noise = &self.shooting.noise;
+        let shooting =
+            (self.error_model).shooting(logs, windows, noise, &self.smoothing_velocities);
+        let same: &Problem<'b> = self;
         Problem {
-            declared: self.declared,
-            library: self.library,
-            error_model: self.error_model,
-            solver: self.solver,
-            settings: self.settings,
             logs,
             audits: Arc::default(),
-            smoothing_velocities: self.smoothing_velocities.clone(),
-            top_speed: self.top_speed.clone(),
-            top_torque: self.top_torque.clone(),
-            top_driving: self.top_driving.clone(),
-            sample: Sample::of(&shooting, self.settings.fit.sample_windows),
-            shooting,
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
             held: Vec::new(),
+            ..same.over(shooting.near(self.declared))
         }
     }
 
@@ -253,10 +222,8 @@ impl<'a> Problem<'a> {
     pub(super) fn started_from(&self) -> Model {
         let mut model = self.declared.clone();
         for parameter in &mut model.parameters {
-            let moved = self
-                .moved_to
-                .iter()
-                .find(|moved| moved.name == parameter.name);
+            let mut moved = self.moved_to.iter();
+            let moved = moved.find(|moved| moved.name == parameter.name);
             *parameter = moved.unwrap_or(parameter).clone();
         }
         model
@@ -285,17 +252,22 @@ impl<'a> Problem<'a> {
         start_states: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
+        self.fitted_by(model, |dynamics, active| {
+            let (solver, shooting) = (self.solver, &self.shooting);
+            fit_by(solver, shooting, dynamics, active, start_states, scale)
+        })
+    }
+
+    /// A model with the problem's smoothing of friction, fitted by `fit`, which is given the parameters that it may
+    /// change.
+    pub(super) fn fitted_by<E>(
+        &self,
+        model: &Model,
+        fit: impl FnOnce(&Dynamics, &[usize]) -> Result<(Values, Fit), E>,
+    ) -> Result<Fitted, E> {
         let model = self.smoothed(model);
         let dynamics = self.error_model.compile(&model);
-        let active = self.active(&dynamics);
-        let found = fit_by(
-            self.solver,
-            &self.shooting,
-            &dynamics,
-            &active,
-            start_states,
-            scale,
-        )?;
+        let found = fit(&dynamics, &self.active(&dynamics))?;
         Ok(Fitted::new(&model, &dynamics, found, self.logs))
     }
 
@@ -317,12 +289,9 @@ impl<'a> Problem<'a> {
         fitted: &Fitted,
         effects: Vec<FittedEffect>,
     ) -> Result<Fitted, FitError> {
-        let (start_states, scale) = (fitted.fit.start_states.clone(), fitted.fit.scale);
-        self.refit(
-            &fitted.model.with_effects(effects),
-            start_states,
-            Some(scale),
-        )
+        let start_states = fitted.fit.start_states.clone();
+        let model = fitted.model.with_effects(effects);
+        self.refit(&model, start_states, Some(fitted.fit.scale))
     }
 
     /// As [`Problem::with_effects`], if only a loss below `below` is of use: `None` if the model cannot be fitted or
@@ -333,20 +302,15 @@ impl<'a> Problem<'a> {
         effects: Vec<FittedEffect>,
         below: f64,
     ) -> Option<Fitted> {
-        let model = self.smoothed(&fitted.model.with_effects(effects));
-        let dynamics = self.error_model.compile(&model);
-        let (active, start_states) = (self.active(&dynamics), fitted.fit.start_states.clone());
+        let start_states = fitted.fit.start_states.clone();
         let aim = (fitted.fit.scale, below);
-        let found = fit_below(
-            self.solver,
-            &self.shooting,
-            &dynamics,
-            &active,
-            start_states,
-            aim,
-        )
-        .ok()??;
-        Some(Fitted::new(&model, &dynamics, found, self.logs))
+        let model = fitted.model.with_effects(effects);
+        let fitted = self.fitted_by(&model, |dynamics, active| {
+            let (solver, shooting) = (self.solver, &self.shooting);
+            let found = fit_below(solver, shooting, dynamics, active, start_states, aim);
+            found.ok().flatten().ok_or(())
+        });
+        fitted.ok()
     }
 
     /// The same without the k-th effect of a model.
@@ -384,7 +348,8 @@ impl<'a> Problem<'a> {
 
     /// Parameters that a fit may change.
     pub fn active(&self, dynamics: &Dynamics) -> Vec<usize> {
-        let free = |k: &usize| !dynamics.parameters[*k].fixed && !self.held.contains(k);
-        (0..dynamics.parameters.len()).filter(free).collect()
+        let mut active = free_parameters(dynamics);
+        active.retain(|k| !self.held.contains(k));
+        active
     }
 }

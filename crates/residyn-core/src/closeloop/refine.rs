@@ -4,7 +4,6 @@ use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::judge::Found;
 use super::problem::Problem;
-use super::settings::RefineSettings;
 use super::stage::{Stage, Watch};
 use crate::identify::{
     FitError, Identifiability, IdentifiableBodies, Uncertainty, Values, identifiable_bodies,
@@ -84,19 +83,13 @@ impl<'a> Problem<'a> {
     /// file gives stay, and so do parameters that the logs do not determine: the intervals of the others are relative
     /// to them.
     pub fn refined(&self) -> Self {
-        let RefineSettings {
-            step_s,
-            smoothing_velocity_factor: narrower,
-        } = self.settings.refine;
-        let narrower = self
-            .declared
-            .smoothing_velocity
-            .as_ref()
-            .map_or(narrower, |_| 1.0);
-        let of_joint = |(width, top): (&f64, &f64)| match *width
-            > self.settings.fit.smoothing_velocity_share * top
-        {
-            // The rig's friction reverses over this width.
+        let settings = &self.settings.refine;
+        let (step_s, narrower) = (settings.step_s, settings.smoothing_velocity_factor);
+        let given = self.declared.smoothing_velocity.as_ref();
+        let narrower = given.map_or(narrower, |_| 1.0);
+        let usual = self.settings.fit.smoothing_velocity_share;
+        // A width above the usual one is that over which the rig's friction reverses.
+        let of_joint = |(width, top): (&f64, &f64)| match *width > usual * top {
             true => *width,
             false => narrower * width,
         };

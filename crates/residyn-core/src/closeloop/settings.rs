@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::sim::FINE_FIT_S;
 
-/// Declares a struct of settings, each default next to its reason.
+/// Declares structs of settings, each default next to its reason.
 macro_rules! settings {
-    ($(#[$about:meta])* $name:ident {
+    ($($(#[$about:meta])* $name:ident {
         $($(#[$doc:meta])* $field:ident: $kind:ty = $default:expr,)*
-    }) => {
+    })*) => {$(
         $(#[$about])*
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[non_exhaustive]
@@ -28,7 +28,7 @@ macro_rules! settings {
                 Self { $($field: $default,)* }
             }
         }
-    };
+    )*};
 }
 
 impl ScoreSettings {
@@ -82,9 +82,7 @@ settings! {
         /// from.
         largest_share: f64 = 0.5,
     }
-}
 
-settings! {
     /// Stage 3 fits the models.
     FitSettings {
         /// The windows of the first fit have this length in s: even a poor start does not diverge in them.
@@ -119,9 +117,7 @@ settings! {
         /// is kept: a single fit may end in a local minimum.
         fitted_starts: usize = 3,
     }
-}
 
-settings! {
     /// Stage 4 tries sets of effects and chooses one.
     SelectSettings {
         /// A set has at most this many effects in a model of few joints; `most_effects_per_joint` allows more in a
@@ -198,9 +194,7 @@ settings! {
         /// numbers: 2 GB. If there are more candidates, those with the largest predicted gain alone are kept.
         most_numbers: usize = 1 << 28,
     }
-}
 
-settings! {
     /// The second half of stage 4 decides which of the selected effects are established.
     EstablishSettings {
         /// The probability of a false alarm for one effect is at most this, over all candidates and all their starting
@@ -232,9 +226,7 @@ settings! {
         /// load may end where the bodies stand for the load.
         payload_masses: [f64; 4] = [0.5, 1.0, 2.0, 4.0],
     }
-}
 
-settings! {
     /// Stage 5 decides what counts as an unexplained residual.
     DiagnosticsSettings {
         /// The unexplained residual is significant below this probability.
@@ -261,9 +253,7 @@ settings! {
         /// encoder noise of 1 mrad makes an error of 0.3 rad/s^2.
         block_s: f64 = 0.15,
     }
-}
 
-settings! {
     /// Stage 5 fits smooth curves to the residual force (Eilers and Marx 1996).
     CurveSettings {
         /// A curve has this many points.
@@ -281,9 +271,7 @@ settings! {
         /// Forces more than this many scales away from the curves weigh less (Huber 1964).
         huber_scales: f64 = 3.0,
     }
-}
 
-settings! {
     /// Stage 5 proposes a formula for the unexplained residual.
     ProposalSettings {
         /// A formula has at most this many terms: longer ones explain everything.
@@ -291,9 +279,7 @@ settings! {
         /// This many terms are fitted after all have been screened.
         fitted_terms: usize = 4,
     }
-}
 
-settings! {
     /// Fitted models show problems of the logs that audits alone do not see.
     NoteSettings {
         /// The torques are reported as reversed if reversing all of them leaves less than this share of the loss: half
@@ -316,9 +302,7 @@ settings! {
         /// An external force lasts at least this many blocks: an end stop or a joint that sticks is over in one.
         external_force_blocks: usize = 2,
     }
-}
 
-settings! {
     /// Stage 6 simulates experiments and decides when one of them suffices.
     DiscriminateSettings {
         /// Experiments are simulated against this many of the best alternatives: each costs as much as a few fits.
@@ -358,9 +342,7 @@ settings! {
         /// A difference below this share of the noise is less than what every model gets wrong.
         visible_share: f64 = 0.1,
     }
-}
 
-settings! {
     /// Stage 7 computes the final estimate. Smoothing and integration steps shift dry friction by a few parts in a
     /// thousand, more than the noise of long logs does.
     RefineSettings {
@@ -370,9 +352,7 @@ settings! {
         /// gives the width.
         smoothing_velocity_factor: f64 = 0.5,
     }
-}
 
-settings! {
     /// Stage 8 trains the residual network.
     LearnSettings {
         /// Rows are averaged over this time in s: the network is to learn a force, not the encoder's noise.
@@ -400,9 +380,7 @@ settings! {
         /// The training's history has one entry per this many epochs.
         record_every: NonZeroUsize = const { NonZeroUsize::new(10).unwrap() },
     }
-}
 
-settings! {
     /// Stage 9 scores the models.
     ScoreSettings {
         /// Errors are reported at these horizons in s; models are compared in one number at the middle one. Horizons
@@ -422,9 +400,7 @@ settings! {
         /// square.
         most_logs_crossed: usize = 8,
     }
-}
 
-settings! {
     /// These settings decide when the logs allow a verdict.
     VerdictSettings {
         /// A conclusion needs at least this many windows.
@@ -433,9 +409,7 @@ settings! {
         /// start states raises it by less.
         trusted_rise: f64 = 1.05,
     }
-}
 
-settings! {
     /// Stage 10 determines what the logs can show.
     CalibrateSettings {
         /// An effect of the smallest size is to be named in the share of logs with this standard normal quantile: 80 %.

@@ -31,7 +31,7 @@ impl Problem<'_> {
             let reverses = reversing(fitted, &before);
             for share in self.settings.fit.wider_sign_shares {
                 let mut widths = before.clone();
-                widths[joint] = share * self.top_speed[joint].max(1e-6);
+                widths[joint] = width(share, self.top_speed[joint]);
                 let is_wider = widths[joint] > before[joint];
                 if !is_wider || watch.has_to_end() || reversing(fitted, &widths) == reverses {
                     continue;
@@ -51,6 +51,11 @@ impl Problem<'_> {
         let again = problem.estimate(fitted).ok()?;
         Some(Loss::of(&problem, &again).total())
     }
+}
+
+/// This share of a joint's top speed, as a smoothing velocity, which is never zero.
+pub(super) fn width(share: f64, top_speed: f64) -> f64 {
+    share * top_speed.max(1e-6)
 }
 
 /// The program of a model with these smoothing velocities: a joint's width changes nothing if it has no dry friction.

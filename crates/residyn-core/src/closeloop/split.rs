@@ -93,11 +93,6 @@ impl SplitSettings {
     }
 
     /// How many of `logs` logs are set apart.
-    #[allow(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss
-    )] // few logs
     fn count_of(&self, logs: usize) -> usize {
         ((logs as f64 * self.test_share).round() as usize).max(1)
     }

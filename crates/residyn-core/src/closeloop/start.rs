@@ -24,16 +24,12 @@ pub(super) fn around(problem: &Problem<'_>) -> impl Iterator<Item = Model> {
 /// A model with its free parameters at values ever farther from its declared ones: spread evenly in the logarithm
 /// (Halton 1960), each keeping its sign.
 fn spread(declared: &Model, settings: &FitSettings) -> impl Iterator<Item = Model> {
-    let FitSettings {
-        most_starts,
-        farthest_start,
-        ..
-    } = *settings;
-    (1..=most_starts).map(move |k| {
+    let most = settings.most_starts;
+    (1..=most).map(move |k| {
         let mut model = declared.clone();
         let free = model.parameters.iter_mut().filter(|p| !p.fixed);
         for (parameter, base) in free.zip(BASES.into_iter().cycle()) {
-            let reach = farthest_start.ln() * f64::from(k) / f64::from(most_starts);
+            let reach = settings.farthest_start.ln() * f64::from(k) / f64::from(most);
             move_by(parameter, reach * (2.0 * radical_inverse(k, base) - 1.0));
         }
         model

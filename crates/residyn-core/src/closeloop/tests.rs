@@ -10,6 +10,7 @@ use super::establish::{Chosen, Standing, establish};
 use super::fit::{Declared, NOTHING};
 use super::fitted::Fitted;
 use super::judge::Found;
+use super::outcome::Outcome;
 use super::pipeline::{close_loop, find};
 use super::problem::Problem;
 use super::refine::refined;
@@ -25,14 +26,82 @@ use crate::identify::{FitError, Termination};
 use crate::model::{FittedEffect, Library, Model, Status};
 use crate::plant::Plant;
 
-const RIG: &str = r#"
+/// A pendulum, logged at 100 Hz.
+const PENDULUM: &str = r#"
 model = "pendulum"
 parameters = { C_g = -17.4, C_i = 4.6 }
 sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+"#;
+
+/// Three slow motions of one joint.
+const MOTION: &str = r#"
 excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
 recording = { logs = 3, duration_s = 8, start = [0, 0] }
-effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.2 }]
 "#;
+
+const FRICTION: &str = r#"effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.2 }]"#;
+
+/// Logs, and the model and the library that they are studied with.
+pub(super) struct Study {
+    pub declared: Model,
+    pub library: Library,
+    pub logs: Vec<Log>,
+    pub settings: Settings,
+}
+
+impl Study {
+    /// A model, with logs of the rig in this file.
+    pub fn of(declared: Model, rig: &str) -> Self {
+        Self {
+            declared,
+            library: Library::built_in(),
+            logs: recorded(rig, 0),
+            settings: Settings::default(),
+        }
+    }
+
+    /// A pendulum with dry friction, which the model lacks.
+    pub fn of_friction() -> Self {
+        Self::of(pendulum(), &[PENDULUM, MOTION, FRICTION].concat())
+    }
+
+    pub fn problem(&self) -> Problem<'_> {
+        Problem::new(&self.declared, &self.library, &self.logs, &self.settings)
+    }
+
+    /// A problem in which nothing can be found.
+    pub fn closed(&self) -> Problem<'_> {
+        Problem::new(&self.declared, &NOTHING, &self.logs, &self.settings)
+    }
+
+    pub fn fitted(&self) -> Declared<'_> {
+        self.problem().fit_declared().unwrap()
+    }
+
+    /// The study of the training logs, and the test logs.
+    fn split(self) -> (Self, Vec<Log>) {
+        let Split { train, test, .. } = Split::of(self.logs, &self.settings.split);
+        (
+            Self {
+                logs: train,
+                ..self
+            },
+            test,
+        )
+    }
+
+    fn scorer<'a>(&'a self, test: &'a [Log]) -> Scorer<'a> {
+        let settings = &self.settings.score;
+        Scorer { test, settings }
+    }
+
+    /// The loop, closed on all logs with changed settings.
+    fn outcome(&self, change: impl FnOnce(&mut Settings), watch: &dyn Watch) -> Outcome {
+        let mut request = Request::of(&self.declared, &self.library, self.logs.clone());
+        change(&mut request.settings);
+        close_loop(request, &mut ChaCha8Rng::seed_from_u64(0), watch).unwrap()
+    }
+}
 
 /// The logs of the rig in this file.
 pub(super) fn recorded(rig: &str, seed: u64) -> Vec<Log> {
@@ -43,11 +112,6 @@ pub(super) fn recorded(rig: &str, seed: u64) -> Vec<Log> {
     (0..plant.recording.logs)
         .map(|_| plant.record(&mut rng).unwrap())
         .collect()
-}
-
-/// Logs of a pendulum with dry friction.
-pub(super) fn logs() -> Vec<Log> {
-    recorded(RIG, 0)
 }
 
 pub(super) fn pendulum() -> Model {
@@ -73,15 +137,10 @@ fn search<'a>(problem: &Problem<'a>) -> Found<'a> {
     find(problem.fit_declared().unwrap(), &[], &mut rng, &()).unwrap()
 }
 
-/// A problem in which nothing can be found.
-fn closed<'a>(declared: &'a Model, logs: &'a [Log], settings: &'a Settings) -> Problem<'a> {
-    Problem::new(declared, &NOTHING, logs, settings)
-}
-
 #[test]
 fn a_model_that_diverges_has_no_residual_force() {
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let problem = closed(&declared, &logs, &settings);
+    let study = Study::of_friction();
+    let problem = study.closed();
     let model = problem.fit_declared().unwrap().fitted;
     assert!(ResidualForce::of(&problem, &model).unwrap().norm() > 0.0);
     let failed = ResidualForce::of(&problem, &diverging(model));
@@ -91,13 +150,12 @@ fn a_model_that_diverges_has_no_residual_force() {
 /// The rig has one of two effects; the other removes only noise.
 #[test]
 fn an_effect_that_saves_little_is_not_established() {
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let library = Library::built_in();
-    let problem = Problem::new(&declared, &library, &logs, &settings);
-    let start = declared.with_effects(["coulomb_friction", "gravity_tilt"].map(absent).into());
-    let fitted = problem
-        .refit(&start, problem.shooting.initial_start_states(0), None)
-        .unwrap();
+    let study = Study::of_friction();
+    let problem = study.problem();
+    let effects = ["coulomb_friction", "gravity_tilt"].map(absent);
+    let start = study.declared.with_effects(effects.into());
+    let start_states = problem.shooting.initial_start_states(0);
+    let fitted = problem.refit(&start, start_states, None).unwrap();
     let selected = Selected {
         chosen: Ok(Trial::of(&problem, fitted.clone())),
         rounds: Vec::new(),
@@ -107,30 +165,21 @@ fn an_effect_that_saves_little_is_not_established() {
     let statuses: Vec<Status> = standings.iter().map(|s| s.status).collect();
     assert_eq!(statuses, [Status::Established, Status::Supported]);
     assert!(standings[0].reason.is_none());
-    assert!(
-        standings[1]
-            .reason
-            .as_ref()
-            .unwrap()
-            .contains("the loss on left-out blocks by")
-    );
+    let reason = standings[1].reason.as_ref().unwrap();
+    assert!(reason.contains("the loss on left-out blocks by"));
 }
 
 #[test]
 fn a_fit_that_fails_allows_no_verdict() {
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let (split, library) = (Split::of(logs, &settings.split), Library::built_in());
-    let problem = Problem::new(&declared, &library, &split.train, &settings);
+    let (study, test) = Study::of_friction().split();
+    let problem = study.problem();
     let mut found = search(&problem);
-    let scorer = Scorer {
-        test: &split.test,
-        settings: &settings.score,
-    };
+    let scorer = study.scorer(&test);
     let finer = refined(&found.problem, &found.before, &found.chosen.after);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let models = Scored {
         error_model: problem.error_model,
-        declared: &declared,
+        declared: &study.declared,
         before: &finer.before,
         with_friction: None,
         after: &finer.after,
@@ -141,11 +190,8 @@ fn a_fit_that_fails_allows_no_verdict() {
     let of = |found: &Found<'_>, refined: &_| verdict(found, refined, &errors);
     assert_eq!(of(&found, &finer).0, Verdict::Explained);
 
-    let mut failed = refined(
-        &found.problem,
-        &found.before,
-        &diverging(found.chosen.after.clone()),
-    );
+    let diverged = diverging(found.chosen.after.clone());
+    let mut failed = refined(&found.problem, &found.before, &diverged);
     assert!(matches!(failed.failure, Some(FitError::Diverged { .. })));
     failed.after = finer.after.clone();
     let (answer, reason) = of(&found, &failed);
@@ -169,35 +215,29 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     let bounded = "sin(q1) * (1 + 1e-9*sqrt(3.6 - abs(q1)))";
     let text = pendulum().declaration.replace("sin(q1)", bounded);
     let declared = Model::from_text(Path::new("rig.toml"), &text, &[]).unwrap();
-    let (mut logs, settings) = (logs(), Settings::default());
-    for tau in logs.iter_mut().flat_map(|log| &mut log.tau[0]) {
+    let mut study = Study {
+        declared,
+        ..Study::of_friction()
+    };
+    for tau in study.logs.iter_mut().flat_map(|log| &mut log.tau[0]) {
         *tau += 8.0;
     }
-    let (split, library) = (Split::of(logs, &settings.split), Library::built_in());
-    let problem = Problem::new(&declared, &library, &split.train, &settings);
+    let (study, test) = study.split();
+    let problem = study.problem();
     let bias = |size: f64| FittedEffect {
         values: vec![(size, None)],
         ..absent("constant_torque")
     };
-    let mut start = declared.with_effects(vec![bias(-8.0)]);
+    let mut start = study.declared.with_effects(vec![bias(-8.0)]);
     for (parameter, value) in start.parameters.iter_mut().zip([-17.4, 4.6]) {
         parameter.value = value;
     }
     let start_states = problem.shooting.initial_start_states(0);
     let chosen = problem.refit(&start, start_states, None).unwrap();
     let refined = refined(&problem, &chosen, &chosen);
-    let scorer = Scorer {
-        test: &split.test,
-        settings: &settings.score,
-    };
-    let standing = Standing {
-        effect: chosen.model.effects[0].clone(),
-        status: Status::Established,
-        gain: 1.0,
-        p_value: 0.0,
-        reason: None,
-        without: problem.without_effect(&chosen, 0),
-    };
+    let scorer = study.scorer(&test);
+    let effect = chosen.model.effects[0].clone();
+    let standing = Standing::sure(effect, (1.0, 0.0), problem.without_effect(&chosen, 0));
     let chosen = Chosen {
         after: chosen,
         standings: vec![standing],
@@ -208,24 +248,18 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     };
     let found = findings(&problem, &chosen, &refined, &scorer);
     assert_eq!(found.len(), 1);
-    assert!(matches!(
-        found[0].error_reduction,
-        Err(FitError::Diverged { .. })
-    ));
+    let reduction = &found[0].error_reduction;
+    assert!(matches!(reduction, Err(FitError::Diverged { .. })));
     assert!(found[0].p_value < 1e-6);
 }
 
 #[test]
 fn the_error_reduction_compares_two_fits_in_the_same_steps() {
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let (split, library) = (Split::of(logs, &settings.split), Library::built_in());
-    let problem = Problem::new(&declared, &library, &split.train, &settings);
+    let (study, test) = Study::of_friction().split();
+    let problem = study.problem();
     let found = search(&problem);
     let finer = refined(&found.problem, &found.before, &found.chosen.after);
-    let scorer = Scorer {
-        test: &split.test,
-        settings: &settings.score,
-    };
+    let scorer = study.scorer(&test);
     let reported = findings(&problem, &found.chosen, &finer, &scorer);
     let reduction = *reported[0].error_reduction.as_ref().unwrap();
     let after = &found.chosen.after;
@@ -252,48 +286,48 @@ effect = [
     { name = "viscous_friction", joint = 2, b = 0.03 },
 ]
 "#;
-    let library = Library::built_in();
-    let logs = recorded(RIG, 0);
-    let (declared, settings) = (library.model("acrobot").unwrap(), Settings::default());
-    let found = search(&Problem::new(&declared, &library, &logs, &settings));
-    let established = found
-        .chosen
-        .standings
-        .iter()
-        .filter(|s| s.status == Status::Established);
-    let mut names: Vec<String> = established.map(|s| s.effect.label()).collect();
+    let acrobot = Library::built_in().model("acrobot").unwrap();
+    let study = Study::of(acrobot, RIG);
+    let found = search(&study.problem());
+    let mut names: Vec<String> = found.chosen.named().map(FittedEffect::label).collect();
     names.sort();
     let of = |name: &str| [1, 2].map(|joint| format!("{name} on joint {joint}"));
-    assert_eq!(
-        names,
-        [of("coulomb_friction"), of("viscous_friction")].concat()
-    );
+    let wanted = [of("coulomb_friction"), of("viscous_friction")].concat();
+    assert_eq!(names, wanted);
+}
+
+/// Let every residual be noteworthy, and all or none significant.
+fn all_residuals_matter(settings: &mut Settings, significance: f64) {
+    let diagnostics = &mut settings.diagnostics;
+    (diagnostics.noteworthy_share, diagnostics.unlocated_share) = (-1.0, -1.0);
+    diagnostics.significance = significance;
+}
+
+/// Let no effect be added.
+fn nothing_is_added(settings: &mut Settings) {
+    settings.select.most_effects = 0;
+    settings.select.most_effects_per_joint = 0;
 }
 
 /// If the test logs contradict the effects, a residual shows that something is missing; without one the verdict stays
 /// open.
 #[test]
 fn effects_that_raise_the_error_on_the_test_logs_are_doubted() {
-    let (declared, library) = (pendulum(), Library::built_in());
+    let study = Study::of_friction();
     let outcome = |significance: f64| {
-        let mut request = Request::of(&declared, &library, logs());
-        // Every effect counts as worse, and every residual as noteworthy.
-        request.settings.verdict.trusted_rise = 0.0;
-        request.settings.establish.masking_share = f64::INFINITY;
-        request.settings.establish.outweighed_share = 0.0;
-        let diagnostics = &mut request.settings.diagnostics;
-        (diagnostics.noteworthy_share, diagnostics.unlocated_share) = (-1.0, -1.0);
-        diagnostics.significance = significance;
-        let mut rng = ChaCha8Rng::seed_from_u64(0);
-        close_loop(request, &mut rng, &()).unwrap()
+        let change = |settings: &mut Settings| {
+            // Every effect counts as worse, and every residual as noteworthy.
+            settings.verdict.trusted_rise = 0.0;
+            settings.establish.masking_share = f64::INFINITY;
+            settings.establish.outweighed_share = 0.0;
+            all_residuals_matter(settings, significance);
+        };
+        study.outcome(change, &())
     };
     let missing = outcome(2.0);
     assert_eq!(missing.verdict, Verdict::PartlyExplained);
-    assert!(
-        missing.reason.contains("raise the error"),
-        "{}",
-        missing.reason
-    );
+    let reason = missing.reason;
+    assert!(reason.contains("raise the error"), "{reason}");
     let nothing_missing = outcome(0.0);
     assert_eq!(nothing_missing.verdict, Verdict::Inconclusive);
 }
@@ -301,14 +335,11 @@ fn effects_that_raise_the_error_on_the_test_logs_are_doubted() {
 /// An effect outweighed by the unexplained residual may be a part of the real cause's shape.
 #[test]
 fn an_effect_that_a_remainder_outweighs_is_not_established() {
-    let (declared, library) = (pendulum(), Library::built_in());
-    let mut request = Request::of(&declared, &library, logs());
-    let diagnostics = &mut request.settings.diagnostics;
-    (diagnostics.noteworthy_share, diagnostics.unlocated_share) = (-1.0, -1.0);
-    diagnostics.significance = 2.0;
-    request.settings.establish.outweighed_share = f64::INFINITY;
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let outcome = close_loop(request, &mut rng, &()).unwrap();
+    let change = |settings: &mut Settings| {
+        all_residuals_matter(settings, 2.0);
+        settings.establish.outweighed_share = f64::INFINITY;
+    };
+    let outcome = Study::of_friction().outcome(change, &());
     assert!(outcome.effects.findings.is_empty());
     let reason = outcome.effects.supported[0].reason.as_ref().unwrap();
     assert!(reason.contains("remains unexplained"), "{reason}");
@@ -326,9 +357,7 @@ fn a_search_that_is_ended_allows_no_verdict() {
             true
         }
     }
-    let (declared, library) = (pendulum(), Library::built_in());
-    let request = Request::of(&declared, &library, logs());
-    let outcome = close_loop(request, &mut ChaCha8Rng::seed_from_u64(0), &Ended).unwrap();
+    let outcome = Study::of_friction().outcome(|_| (), &Ended);
     assert!(outcome.effects.stopped && outcome.effects.rounds.iter().all(|r| r.tried.is_empty()));
     assert_eq!(outcome.verdict, Verdict::Inconclusive);
 }
@@ -336,40 +365,24 @@ fn a_search_that_is_ended_allows_no_verdict() {
 /// The model is the same before and after, and so is its error.
 #[test]
 fn without_effects_the_error_reduction_is_zero() {
-    let (declared, library) = (pendulum(), Library::built_in());
-    let mut request = Request::of(&declared, &library, logs());
-    request.settings.select.most_effects = 0;
-    request.settings.select.most_effects_per_joint = 0;
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let outcome = close_loop(request, &mut rng, &()).unwrap();
+    let outcome = Study::of_friction().outcome(nothing_is_added, &());
     assert!(outcome.effects.findings.is_empty());
     assert_eq!(outcome.errors.reduction_ci95, Some([0.0, 0.0]));
 }
 
 #[test]
 fn a_changed_setting_changes_the_search() {
-    let (declared, library, logs) = (pendulum(), Library::built_in(), logs());
-    let named = |settings: &Settings| {
-        search(&Problem::new(&declared, &library, &logs, settings))
-            .chosen
-            .after
-            .model
-            .effects
-            .len()
-    };
-    let mut settings = Settings::default();
-    assert_eq!(named(&settings), 1);
-    settings.select.most_effects = 0;
-    settings.select.most_effects_per_joint = 0;
-    assert_eq!(named(&settings), 0);
+    let mut study = Study::of_friction();
+    let added = |study: &Study| search(&study.problem()).chosen.standings.len();
+    assert_eq!(added(&study), 1);
+    nothing_is_added(&mut study.settings);
+    assert_eq!(added(&study), 0);
 }
 
 #[test]
 fn a_search_that_begins_over_short_windows_ends_with_the_same_effects() {
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let library = Library::built_in();
-    let problem = Problem::new(&declared, &library, &logs, &settings);
-    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let study = Study::of_friction();
+    let Declared { problem, fitted } = study.fitted();
     let short = problem.fitted_over_short_windows().unwrap();
     let problem = problem.knowing(short.problem.identifiability.clone());
     assert!(short.problem.shooting.windows.len() > 2 * problem.shooting.windows.len());
@@ -387,41 +400,30 @@ fn a_search_that_begins_over_short_windows_ends_with_the_same_effects() {
 #[test]
 fn windows_with_dropped_rows_do_not_count_as_unexplained() {
     const ROUGH: &str = r#"
-model = "pendulum"
-parameters = { C_g = -17.4, C_i = 4.6 }
-sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
 excitation = { amplitude = [1.6], band_hz = [0.15, 15.0], tones = 30 }
 recording = { logs = 3, duration_s = 8, start = [0, 0] }
 "#;
     let with_dropped = |mut log: Log| {
         let kept = |row: &usize| *row > 500 || row % 20 != 7;
-        let of = |column: &[f64]| {
-            (0..column.len())
-                .filter(kept)
-                .map(|row| column[row])
-                .collect()
+        let of = |column: &mut Vec<f64>| {
+            let mut row = 0..;
+            column.retain(|_| row.next().is_some_and(|row| kept(&row)));
         };
-        log.q = log.q.iter().map(|column| of(column)).collect();
-        log.qd = log.qd.iter().map(|column| of(column)).collect();
-        log.tau = log.tau.iter().map(|column| of(column)).collect();
-        log.time = of(&log.time);
+        let channels = log.q.iter_mut().chain(&mut log.qd).chain(&mut log.tau);
+        channels.chain([&mut log.time]).for_each(of);
         log.for_fits(0.5)
     };
-    let (declared, settings) = (pendulum(), Settings::default());
-    let library = Library::built_in();
-    let mut logs: Vec<Log> = recorded(ROUGH, 0).into_iter().map(with_dropped).collect();
-    let found = |logs: &[Log]| {
-        let problem = Problem::new(&declared, &library, logs, &settings);
-        search(&problem).unexplained
-    };
-    let left = found(&logs);
+    let mut study = Study::of(pendulum(), &[PENDULUM, ROUGH].concat());
+    study.logs = study.logs.into_iter().map(with_dropped).collect();
+    let found = |study: &Study| search(&study.problem()).unexplained;
+    let left = found(&study);
     assert!(!left.is_significant(), "{left:?}");
     assert!((1..30).contains(&left.omnibus.windows), "{left:?}");
-    for log in &mut logs {
+    for log in &mut study.logs {
         assert_eq!(log.filled.len(), 25);
         log.masked = vec![std::mem::take(&mut log.filled)];
     }
-    assert!(found(&logs).is_significant(), "were they counted");
+    assert!(found(&study).is_significant(), "were they counted");
 }
 
 /// An inertia a fifth of the rig's and a moment five times as large make the mass matrix indefinite.
@@ -439,13 +441,12 @@ recording = { logs = 2, duration_s = 6, start = [0, 0, 0, 0] }
     let far = text
         .replace("{ value = 0.03,", "{ value = 0.006,")
         .replace("{ value = 0.15,", "{ value = 0.75,");
-    let (near, far) = (read(text), read(&far));
-    let (logs, settings) = (recorded(RIG, 0), Settings::default());
-    let fitted = |model: &Model| {
-        let found = closed(model, &logs, &settings).fit_declared().unwrap();
+    let fitted = |text: &str| {
+        let study = Study::of(read(text), RIG);
+        let found = study.closed().fit_declared().unwrap();
         (found.fitted.model.values(), found.problem.moved_to)
     };
-    let (wanted, unmoved) = fitted(&near);
+    let (wanted, unmoved) = fitted(text);
     let (found, moved_to) = fitted(&far);
     assert!(unmoved.is_empty());
     assert!(moved_to.iter().any(|p| p.name == "s2" && p.value < 0.7));
@@ -458,14 +459,6 @@ recording = { logs = 2, duration_s = 6, start = [0, 0, 0, 0] }
 /// other values that explain the logs returns to those nearest to the declared ones.
 #[test]
 fn what_the_logs_do_not_determine_stays_near_the_declared_values() {
-    const RIG: &str = r#"
-model = "pendulum"
-parameters = { C_g = -17.4, C_i = 4.6 }
-sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
-excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
-recording = { logs = 3, duration_s = 8, start = [0, 0] }
-effect = []
-"#;
     const FILE: &str = r#"
 [system]
 name = "rod"
@@ -478,10 +471,10 @@ I = { value = 0.1, positive = true }
 qdd1 = "(tau1 - 9.81 * m * l * sin(q1)) / (I + m * l^2)"
 "#;
     let declared = Model::from_text(Path::new("rod.toml"), FILE, &[]).unwrap();
-    let (logs, settings) = (recorded(RIG, 0), Settings::default());
-    let problem = closed(&declared, &logs, &settings);
+    let study = Study::of(declared, &[PENDULUM, MOTION].concat());
+    let problem = study.closed();
     let (inertia, moment) = (1.0 / 4.6, 17.4 / 4.6 / 9.81);
-    let mut start = declared.clone();
+    let mut start = study.declared.clone();
     let far = [2.0, moment / 2.0, inertia - moment * moment / 2.0];
     for (parameter, value) in start.parameters.iter_mut().zip(far) {
         parameter.value = value;
@@ -501,21 +494,17 @@ qdd1 = "(tau1 - 9.81 * m * l * sin(q1)) / (I + m * l^2)"
 /// friction gets a value.
 #[test]
 fn what_an_effect_of_the_file_is_not_told_from_is_held() {
-    const RIG: &str = r#"
-model = "pendulum"
-parameters = { C_g = -17.4, C_i = 4.6 }
-sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+    const SPUN_DOWN: &str = r#"
 excitation = { amplitude = [0.0], band_hz = [0.15, 2.0], tones = 8 }
 recording = { logs = 2, duration_s = 8, start = [2.0, 0] }
 effect = [{ name = "viscous_friction", joint = 1, b = 0.1 }]
 "#;
-    let (mut declared, library) = (pendulum(), Library::built_in());
+    let mut declared = pendulum();
     declared.parameters[0].value = -15.0;
     let declared = declared.with_effects(vec![absent("viscous_friction")]);
-    let (logs, settings) = (recorded(RIG, 0), Settings::default());
+    let study = Study::of(declared, &[PENDULUM, SPUN_DOWN].concat());
     // Coulomb friction is fitted together with it at first, and does not count.
-    let problem = Problem::new(&declared, &library, &logs, &settings);
-    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let Declared { problem, fitted } = study.fitted();
     assert_eq!(problem.identifiability.hold, [1]);
     assert_eq!(problem.identifiability.free, 3);
     let [_, c_i, b] = fitted.model.values()[..] else {
@@ -526,9 +515,9 @@ effect = [{ name = "viscous_friction", joint = 1, b = 0.1 }]
 
 #[test]
 fn a_result_predicts_a_log() {
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let found = closed(&declared, &logs, &settings).fit_declared().unwrap();
-    let predicted = found.fitted.predict(&logs[0], 0.5);
+    let study = Study::of_friction();
+    let found = study.closed().fit_declared().unwrap();
+    let predicted = found.fitted.predict(&study.logs[0], 0.5);
     assert!(predicted.len() > 10);
 }
 
@@ -542,9 +531,8 @@ excitation = { amplitude = [8.0, 4.0], band_hz = [0.2, 2.0], tones = 8 }
 recording = { logs = 1, duration_s = 6, start = [0, 0, 0, 0] }
 effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.5 }]
 "#;
-    let library = Library::built_in();
-    let declared = library.model("acrobot").unwrap();
-    let settings = Settings::default();
+    let acrobot = Library::built_in().model("acrobot").unwrap();
+    let mut study = Study::of(acrobot, rig);
     let message = |problem: &Problem<'_>, mut audits: Vec<Audit>| -> Vec<String> {
         let usual = problem.with_usual_friction();
         problem.report_reversed(usual.as_ref(), &mut audits);
@@ -558,13 +546,12 @@ effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.5 }]
         audits[0].findings.clear();
         audits
     };
-    let mut logs = recorded(rig, 0);
-    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let problem = study.problem();
     assert!(message(&problem, blank(&problem)).is_empty());
-    for value in logs[0].tau.iter_mut().flatten() {
+    for value in study.logs[0].tau.iter_mut().flatten() {
         *value = -*value;
     }
-    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let problem = study.problem();
     let alone = message(&problem, blank(&problem));
     assert_eq!(alone.len(), 1);
     assert!(alone[0].contains("[columns] tau = "), "{}", alone[0]);

@@ -20,16 +20,16 @@ impl Problem<'_> {
         };
         let share = other.loss() / usual.loss().max(f64::MIN_POSITIVE);
         if share < self.settings.notes.reversed_loss {
-            let columns = &self.declared.columns;
-            let driven_by = self.declared.driven_by();
-            for audit in audits {
-                audit.add(reversed_driving(
-                    share.sqrt(),
-                    columns,
-                    driven_by,
-                    self.declared.joints,
-                ));
-            }
+            let model = self.declared;
+            let finding = reversed_driving(
+                share.sqrt(),
+                &model.columns,
+                model.driven_by(),
+                model.joints,
+            );
+            audits
+                .iter_mut()
+                .for_each(|audit| audit.add(finding.clone()));
         }
     }
 }

@@ -116,24 +116,20 @@ fn what_is_left(left: &Unexplained) -> String {
 
 fn conclusion(added: usize, left: &Unexplained) -> (Verdict, String) {
     let what_is_left = what_is_left(left);
+    let nothing = "no effect in the library lowers the loss on left-out blocks";
     match (added, left.is_significant()) {
-        (0, false) => (
-            Verdict::NoMissingEffect,
-            "no effect in the library lowers the loss on left-out blocks".into(),
-        ),
-        (0, true) => (
-            Verdict::Unexplained,
-            format!(
-                "no effect in the library lowers the loss on left-out blocks, and {what_is_left}"
-            ),
-        ),
-        (_, false) => (
-            Verdict::Explained,
-            "the effects found leave no significant residual".into(),
-        ),
-        (_, true) => (
-            Verdict::PartlyExplained,
-            format!("effects were found, but {what_is_left}"),
-        ),
+        (0, false) => (Verdict::NoMissingEffect, nothing.into()),
+        (0, true) => {
+            let reason = format!("{nothing}, and {what_is_left}");
+            (Verdict::Unexplained, reason)
+        }
+        (_, false) => {
+            let reason = "the effects found leave no significant residual";
+            (Verdict::Explained, reason.into())
+        }
+        (_, true) => {
+            let reason = format!("effects were found, but {what_is_left}");
+            (Verdict::PartlyExplained, reason)
+        }
     }
 }

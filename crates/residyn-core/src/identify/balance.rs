@@ -7,7 +7,7 @@ use super::values::Values;
 use crate::data::{Joint, Log, Smooth, Smoothing, row_from};
 use crate::expr::{Program, Tape};
 use crate::lanes::Row;
-use crate::model::{Dynamics, InputLayout};
+use crate::model::Dynamics;
 use crate::sim::{Commands, Mean, Point, Window};
 
 /// A log as the torque error reads it, thinned out.
@@ -94,13 +94,11 @@ impl Balance {
         noise: &[f64],
     ) -> Self {
         let lane = |lane: usize| members[lane.min(members.len() - 1)];
-        let ranges: Vec<_> = members
-            .iter()
-            .map(|&w| {
-                let window = &windows[w];
-                rows[window.log].within(&logs[window.log], window)
-            })
-            .collect();
+        let range = |&w: &usize| {
+            let window = &windows[w];
+            rows[window.log].within(&logs[window.log], window)
+        };
+        let ranges: Vec<_> = members.iter().map(range).collect();
         let longest = ranges.iter().map(|range| range.len()).max().unwrap_or(0);
         let at = |row: usize| {
             std::array::from_fn(|lane| {
@@ -123,43 +121,32 @@ impl Balance {
 
     /// Evaluate a program at each row, calling `see(lanes, tape)`, where `lanes` gives each lane's row, if it has one.
     /// A program may take the slopes of the torques with respect to filter parameters before its parameters.
-    fn over_rows(
+    fn over_rows<'d>(
         &self,
         program: &Program,
         first_parameter: usize,
         values: &Values,
-        (rows, acting): (&[Rows], &Acting),
+        (rows, acting): (&'d [Rows], &'d Acting),
         mut see: impl FnMut(&[Option<usize>; LANES], &Tape<f64, LANES>),
     ) {
         let mut tape = program.tape_at(first_parameter, &values.common);
-        for own in &values.own {
-            for lane in (0..LANES).filter(|&lane| self.logs[lane] == own.log) {
-                tape.inputs()[first_parameter + own.parameter][lane] = own.value;
-            }
-        }
+        values.by_lane(&self.logs, |parameter, lane, value| {
+            tape.inputs()[first_parameter + parameter][lane] = value;
+        });
+        let of_log = |(log, Rows { smooth, .. }): (usize, &'d Rows)| -> Vec<&'d Vec<f64>> {
+            let driven = smooth.q.iter().chain(&smooth.qd).chain(&acting.tau[log]);
+            let timed = driven.chain([&smooth.time]).chain(&smooth.qdd);
+            timed
+                .chain(&smooth.directions)
+                .chain(&acting.slopes[log])
+                .collect()
+        };
+        // In the order of a torque balance's inputs.
+        let inputs: Vec<Vec<&Vec<f64>>> = rows.iter().enumerate().map(of_log).collect();
         for lanes in &self.at {
-            let of = |value: &dyn Fn(usize, usize) -> f64| {
-                Row::from_fn(|lane| lanes[lane].map_or(0.0, |at| value(self.logs[lane], at)))
-            };
-            let joints = self.weight.len();
-            let layout = InputLayout::of(joints);
-            let filters = acting.slopes[0].len();
-            let moving = tape.moving();
-            for j in 0..joints {
-                moving[j] = of(&|log, at| rows[log].smooth.q[j][at]);
-                moving[layout.velocities().start + j] = of(&|log, at| rows[log].smooth.qd[j][at]);
-                moving[layout.driving().start + j] = of(&|log, at| acting.tau[log][j][at]);
-                moving[layout.accelerations().start + j] =
-                    of(&|log, at| rows[log].smooth.qdd[j][at]);
-                moving[layout.directions().start + j] =
-                    of(&|log, at| rows[log].smooth.directions[j][at]);
-            }
-            moving[layout.time()] = of(&|log, at| rows[log].smooth.time[at]);
-            if moving.len() > layout.parameters_of_balance() {
-                for f in 0..filters {
-                    moving[layout.parameters_of_balance() + f] =
-                        of(&|log, at| acting.slopes[log][f][at]);
-                }
+            for (k, input) in tape.moving().iter_mut().enumerate() {
+                let read = |lane: usize, at: usize| inputs[self.logs[lane]][k][at];
+                *input = Row::from_fn(|lane| lanes[lane].map_or(0.0, |at| read(lane, at)));
             }
             tape.run();
             see(lanes, &tape);
@@ -211,7 +198,7 @@ impl Balance {
     ) -> Vec<(usize, WindowTerms)> {
         let of_joint = |columns: &Vec<usize>| Sums::new(columns.len());
         let mut sums: Vec<Sums> = tangent.columns_of.iter().map(of_joint).collect();
-        let first = tangent.first_parameter();
+        let first = tangent.first_parameter;
         self.over_rows(&tangent.program, first, values, data, |lanes, tape| {
             let of_joints = sums.iter_mut().zip(&self.weight).zip(tangent.slopes());
             for (j, ((sums, weight), (_, slopes))) in of_joints.enumerate() {

@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::intervals::Uncertainty;
+use super::normal_equations::submatrix;
 use super::outcome::Fit;
 use super::sensitivity::{LANES, Local, Tangent};
 use super::values::{Column, Values};
@@ -63,9 +64,8 @@ impl<'a> Columns<'a> {
         let bodies = declared.inertias();
         let place = |column: &Column| {
             let of = |body: &[usize; PARTS]| body.iter().position(|p| *p == column.parameter);
-            (0..)
-                .zip(&bodies)
-                .find_map(|(b, body)| Some((b, of(body)?)))
+            let mut bodies = (0..).zip(&bodies);
+            bodies.find_map(|(b, body)| Some((b, of(body)?)))
         };
         Self {
             fit,
@@ -191,13 +191,11 @@ const ROWS: usize = 64;
 fn identifiable_at_most(columns: &Columns<'_>) -> usize {
     let is_of_body = |i: &usize| columns.places[*i].is_some();
     let own: Vec<usize> = (0..columns.places.len()).filter(is_of_body).collect();
-    let active: Vec<usize> = own
-        .iter()
-        .map(|i| columns.fit.columns[*i].parameter)
-        .collect();
+    let parameters = own.iter().map(|i| columns.fit.columns[*i].parameter);
+    let active: Vec<usize> = parameters.collect();
     let tangent = Tangent::new(columns.dynamics, &active, Local::Nothing);
-    let (first, values) = (tangent.first_parameter(), columns.dynamics.values());
-    let mut tape = tangent.program.tape_at::<f64, LANES>(first, &values);
+    let values = columns.dynamics.values();
+    let mut tape = (tangent.program).tape_at::<f64, LANES>(tangent.first_parameter, &values);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     // For all columns: zero for those that belong to no body.
     let mut information = DMatrix::<f64>::zeros(columns.places.len(), columns.places.len());
@@ -267,10 +265,8 @@ fn weights(relative: &DMatrix<f64>, identifiable: &[usize]) -> Option<Weights> {
     let others: Vec<usize> = (0..relative.nrows())
         .filter(|i| !identifiable.contains(i))
         .collect();
-    let known = relative
-        .select_rows(identifiable)
-        .select_columns(identifiable);
-    let cross = relative.select_rows(identifiable).select_columns(&others);
+    let known = submatrix(relative, identifiable, identifiable);
+    let cross = submatrix(relative, identifiable, &others);
     Some(Weights {
         of: known.cholesky()?.solve(&cross),
         others,

@@ -1,7 +1,6 @@
 use super::levenberg_marquardt::LevenbergMarquardt;
 use super::outcome::{Fit, FitError, Termination};
 use super::search::{Purpose, Search};
-use super::sensitivity::Tangent;
 use super::shooting::Shooting;
 use super::solver::Solver;
 use super::values::Values;
@@ -43,8 +42,7 @@ pub fn fit_by(
     start_states: Vec<Vec<f64>>,
     scale: Option<f64>,
 ) -> Result<(Values, Fit), FitError> {
-    let tangent = Tangent::new(dynamics, active, shooting.local(&start_states));
-    let mut search = Search::new(shooting, dynamics, &tangent, start_states, scale)?;
+    let mut search = Search::new(shooting, dynamics, active, start_states, scale)?;
     let mut termination = solver.solve(&mut search);
     // The scale must be that of the final residuals; the smaller it is, the less the start states' estimates influence
     // them.
@@ -69,8 +67,7 @@ pub fn fit_below(
     start_states: Vec<Vec<f64>>,
     (scale, below): (f64, f64),
 ) -> Result<Option<(Values, Fit)>, FitError> {
-    let tangent = Tangent::new(dynamics, active, shooting.local(&start_states));
-    let search = Search::new(shooting, dynamics, &tangent, start_states, Some(scale))?;
+    let search = Search::new(shooting, dynamics, active, start_states, Some(scale))?;
     let mut search = search.to(Purpose::Choose { below });
     let termination = solver.solve(&mut search);
     let found = (termination != Termination::GivenUp).then(|| search.finish(termination));
@@ -88,8 +85,7 @@ pub fn as_it_stands(
     start_states: Vec<Vec<f64>>,
     scale: f64,
 ) -> Result<Fit, FitError> {
-    let tangent = Tangent::new(dynamics, active, shooting.local(&start_states));
-    let search = Search::new(shooting, dynamics, &tangent, start_states, Some(scale))?;
+    let search = Search::new(shooting, dynamics, active, start_states, Some(scale))?;
     let (_, fit) = search.finish(Termination::AsGiven);
     Ok(fit)
 }
@@ -103,9 +99,8 @@ pub fn predicted_cost(
     start_states: &[Vec<f64>],
     scale: f64,
 ) -> Option<f64> {
-    let tangent = Tangent::new(dynamics, active, shooting.local(start_states));
     let start_states = start_states.to_vec();
-    let search = Search::new(shooting, dynamics, &tangent, start_states, Some(scale)).ok()?;
+    let search = Search::new(shooting, dynamics, active, start_states, Some(scale)).ok()?;
     let decrease = search.predicted_decrease(&search.linearised(), SCREENING_DAMPING)?;
     Some(search.cost() - decrease)
 }

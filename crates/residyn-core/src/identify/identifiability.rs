@@ -1,5 +1,6 @@
 use nalgebra::DMatrix;
 
+use super::normal_equations::submatrix;
 use super::outcome::Fit;
 use super::values::Values;
 use crate::decomposition::eigen;
@@ -63,13 +64,12 @@ pub fn identifiability(
     let loose = loose_directions(&information);
     let undetermined = loose
         .iter()
-        .map(|direction| named(dynamics, fit, direction))
-        .collect();
+        .map(|direction| named(dynamics, fit, direction));
     let (hold, still_loose) = hold(&information, fit, readiness);
     Identifiability {
         free: fit.columns.len(),
         determined: fit.columns.len() - hold.len() - still_loose,
-        undetermined,
+        undetermined: undetermined.collect(),
         hold,
     }
 }
@@ -126,7 +126,7 @@ fn hold(
     fit: &Fit,
     readiness: impl Fn(usize) -> Option<usize>,
 ) -> (Vec<usize>, usize) {
-    let part = |of: &[usize]| loose_directions(&information.select_rows(of).select_columns(of));
+    let part = |of: &[usize]| loose_directions(&submatrix(information, of, of));
     let mut left: Vec<usize> = (0..fit.columns.len()).collect();
     let mut loose = part(&left);
     let mut hold = Vec::new();

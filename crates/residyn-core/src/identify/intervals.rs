@@ -1,7 +1,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::normal_equations::with_unit_diagonal;
+use super::normal_equations::{WindowTerms, with_unit_diagonal};
 use super::outcome::Fit;
 use super::shooting::Shooting;
 use crate::data::SAME_S;
@@ -31,6 +31,11 @@ pub fn blocks(shooting: &Shooting<'_>) -> Vec<usize> {
     let length_s = (total_s / ENOUGH_BLOCKS).clamp(SHORTEST_BLOCK_S, BLOCK_S);
     let starts = windows.iter().map(|w| (w.log, w.start_s(shooting.logs)));
     blocks_of_times(starts, length_s)
+}
+
+/// How many blocks or groups there are; `groups` gives them by number, from 0.
+pub(crate) fn count(groups: &[usize]) -> usize {
+    groups.iter().max().map_or(0, |last| last + 1)
 }
 
 /// The block of about `length_s` (s) in which each window begins; windows are given as log and start in s.
@@ -68,16 +73,10 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         alone.iter().for_each(|&i| part.gradient[i] = 0.0);
     }
     let (model, flat) = inverse(&all);
-    let steps: Vec<DVector<f64>> = parts
-        .iter()
-        .map(|part| inverse(&(&all - &part.hessian)).0 * &part.gradient)
-        .collect();
-    #[allow(clippy::cast_precision_loss)] // few blocks
+    let step = |part: &WindowTerms| inverse(&(&all - &part.hessian)).0 * &part.gradient;
+    let steps: Vec<DVector<f64>> = parts.iter().map(step).collect();
     let share = 1.0 / count.max(1) as f64;
-    let mean = steps
-        .iter()
-        .fold(DVector::zeros(size), |sum, step| sum + step)
-        * share;
+    let mean = (steps.iter()).fold(DVector::zeros(size), |sum, step| sum + step) * share;
     let mut spread = flat + &model * &fit.bodies.hessian * &model * excess(fit, &model);
     for step in &steps {
         let off = step - &mean;
@@ -103,7 +102,6 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
 fn excess(fit: &Fit, covariance: &DMatrix<f64>) -> f64 {
     let bodies = &fit.bodies.hessian;
     let of_bodies = (0..bodies.nrows()).filter(|i| bodies[(*i, *i)] > 0.0);
-    #[allow(clippy::cast_precision_loss)] // a few tens
     let message = of_bodies.count() as f64 - (covariance * bodies).trace();
     (2.0 * fit.bodies.cost / message.max(1.0)).max(1.0)
 }
@@ -134,22 +132,16 @@ fn inverse(hessian: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
         let unknown = DMatrix::from_diagonal_element(scale.len(), scale.len(), f64::INFINITY);
         return (unknown.clone(), unknown);
     };
-    let best = eigen
-        .eigenvalues
-        .iter()
-        .copied()
-        .fold(f64::MIN_POSITIVE, f64::max);
+    let values = eigen.eigenvalues.iter().copied();
+    let best = values.fold(f64::MIN_POSITIVE, f64::max);
     let back = DMatrix::from_diagonal(&scale) * &eigen.eigenvectors;
     let with = |f: &dyn Fn(f64) -> f64| {
         let weights = eigen.eigenvalues.map(|value| f(value.max(1e-15 * best)));
         &back * DMatrix::from_diagonal(&weights) * back.transpose()
     };
-    let flat = |value: f64| {
-        if value < FLAT * best {
-            1.0 / value
-        } else {
-            0.0
-        }
+    let flat = |value: f64| match value < FLAT * best {
+        true => 1.0 / value,
+        false => 0.0,
     };
     (with(&|value| 1.0 / value), with(&flat))
 }
@@ -195,7 +187,6 @@ impl Uncertainty {
     }
 
     fn student(&self, i: usize) -> StudentsT {
-        #[allow(clippy::cast_precision_loss)] // few blocks
         let freedom = (self.blocks_of[i] as f64 - 1.0).max(1.0);
         StudentsT::new(0.0, 1.0, freedom).expect("freedom is at least one")
     }

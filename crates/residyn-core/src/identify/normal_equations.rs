@@ -1,6 +1,8 @@
 //! Normal equations of windows. A window's own values (its start state, and forces if they are free) do not enter other
 //! windows, so they are eliminated by the Schur complement before windows are summed.
 
+use std::ops::AddAssign;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::values::Layout;
@@ -23,6 +25,14 @@ impl WindowTerms {
             gradient: DVector::zeros(values),
             hessian: DMatrix::zeros(values, values),
         }
+    }
+}
+
+impl AddAssign<&Self> for WindowTerms {
+    fn add_assign(&mut self, other: &Self) {
+        self.cost += other.cost;
+        self.gradient += &other.gradient;
+        self.hessian += &other.hessian;
     }
 }
 
@@ -157,9 +167,15 @@ pub(super) fn solve_part(
     if free.is_empty() {
         return Some(DVector::zeros(0));
     }
-    let part = matrix.select_rows(free).select_columns(free);
+    let part = submatrix(matrix, free, free);
     let solution = part.cholesky()?.solve(&right.select_rows(free));
     (solution.iter().all(|value| value.is_finite())).then_some(solution)
+}
+
+/// The part of a matrix in these rows and columns.
+pub fn submatrix(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+    let at = |i: usize, j: usize| matrix[(rows[i], columns[j])];
+    DMatrix::from_fn(rows.len(), columns.len(), at)
 }
 
 /// A matrix in units in which its diagonal is one, and the size of each unit; a diagonal that is not positive stays.

@@ -3,6 +3,7 @@ use std::fmt;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::intervals::count;
 use super::normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
 use super::values::Column;
 use crate::decomposition::eigen;
@@ -50,6 +51,12 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// Which of the free values are of such a parameter.
+    pub(crate) fn columns_of(&self, is_one: impl Fn(usize) -> bool) -> Vec<usize> {
+        let all = 0..self.columns.len();
+        all.filter(|&i| is_one(self.columns[i].parameter)).collect()
+    }
+
     /// Zero normal equations in the free values.
     pub fn zero_equations(&self) -> WindowTerms {
         WindowTerms::zeros(self.columns.len())
@@ -87,18 +94,16 @@ impl Fit {
             let values = eigen.eigenvalues;
             let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
             let largest = values.iter().copied().fold(0.0, f64::max);
-            if smallest > 0.0 {
-                largest / smallest
-            } else {
-                f64::INFINITY
+            match smallest > 0.0 {
+                true => largest / smallest,
+                false => f64::INFINITY,
             }
         })
     }
 
     /// Normal equations of each group of windows; `groups` gives the group of each window, counted from 0.
     pub fn equations_by(&self, groups: &[usize]) -> Vec<WindowTerms> {
-        let count = groups.iter().max().map_or(0, |last| last + 1);
-        let mut parts = vec![self.zero_equations(); count];
+        let mut parts = vec![self.zero_equations(); count(groups)];
         for (window, &group) in self.reduced.iter().zip(groups) {
             window.add_to(&mut parts[group]);
         }

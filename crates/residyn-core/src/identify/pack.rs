@@ -46,10 +46,12 @@ impl Pack {
             .map(|&w| windows[w].rows())
             .max()
             .unwrap_or(0);
+        // Empty lanes repeat the last window, without weight.
+        let window_of = |lane: usize| &windows[members[lane.min(members.len() - 1)]];
         let zeros = || vec![vec![Row::splat(0.0); n]; rows];
         let mut pack = Self {
             windows: members.to_vec(),
-            logs: std::array::from_fn(|lane| windows[members[lane.min(members.len() - 1)]].log),
+            logs: std::array::from_fn(|lane| window_of(lane).log),
             at: vec![[0; LANES]; rows],
             time: vec![Row::splat(0.0); rows],
             dt: vec![Row::splat(0.0); rows],
@@ -60,8 +62,8 @@ impl Pack {
             start: vec![Row::splat(0.0); 2 * n],
             start_weight: vec![Row::splat(0.0); 2 * n],
         };
-        for (lane, &member) in members.iter().enumerate() {
-            let window = windows[member];
+        for lane in 0..members.len() {
+            let window = window_of(lane);
             let (log, half_width) = (&logs[window.log], half_widths[window.log]);
             let start = Start::of(log, window.first, half_width, noise);
             for k in 0..2 * n {
@@ -70,18 +72,14 @@ impl Pack {
             }
         }
         for lane in 0..LANES {
-            // Empty lanes repeat the last window, without weight.
-            let window = windows[members[lane.min(members.len() - 1)]];
+            let window = window_of(lane);
             let log = &logs[window.log];
             for row in 0..rows {
                 let at = (window.first + row).min(window.last);
                 pack.at[row][lane] = at;
                 pack.time[row][lane] = log.time[at];
-                pack.dt[row][lane] = if at < window.last {
-                    log.time[at + 1] - log.time[at]
-                } else {
-                    0.0
-                };
+                // Padding has steps of zero length.
+                pack.dt[row][lane] = log.time[(at + 1).min(window.last)] - log.time[at];
                 for j in 0..n {
                     pack.tau[row][j][lane] = log.tau[j][at];
                     pack.q[row][j][lane] = log.q[j][at];
@@ -113,15 +111,6 @@ impl Pack {
     fn gather(&self, start_states: &[Vec<f64>]) -> Vec<Lane> {
         let lane_of = |lane: usize| &start_states[self.windows[lane.min(self.windows.len() - 1)]];
         Row::table(lane_of(0).len(), |k, lane| lane_of(lane)[k])
-    }
-
-    /// Call `set(parameter, lane, value)` for every value that belongs to the log of a single lane.
-    fn per_log_values(&self, values: &Values, mut set: impl FnMut(usize, usize, f64)) {
-        for own in &values.own {
-            for lane in (0..LANES).filter(|&lane| self.logs[lane] == own.log) {
-                set(own.parameter, lane, own.value);
-            }
-        }
     }
 
     /// The hold from `row` to the next. `force` holds the windows' forces, if they have any.
@@ -161,7 +150,7 @@ impl Pack {
         let model = Point::new(dynamics, values.common.as_slice());
         let mut simulator = Simulator::<LANES>::new(&model, RK4);
         simulator.state = state;
-        self.per_log_values(values, |parameter, lane, value| {
+        values.by_lane(&self.logs, |parameter, lane, value| {
             simulator.set_in_lane(parameter, lane, value);
         });
         for row in 0..self.rows() {
@@ -215,7 +204,7 @@ impl Pack {
         let states = self.gather(start_states);
         let mut sums = Sums::new(columns);
         let mut stepper = TangentStepper::new(tangent, &values.common, RK4);
-        self.per_log_values(values, |parameter, lane, value| {
+        values.by_lane(&self.logs, |parameter, lane, value| {
             stepper.set_in_lane(parameter, lane, value);
         });
         stepper.start(&states);

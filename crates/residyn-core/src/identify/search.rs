@@ -17,7 +17,7 @@ const SETTLED: f64 = 0.01;
 pub struct Search<'a> {
     shooting: &'a Shooting<'a>,
     dynamics: &'a Dynamics,
-    tangent: &'a Tangent,
+    tangent: Tangent,
     layout: Layout,
     at: Point,
     scale: f64,
@@ -51,14 +51,14 @@ pub enum Purpose {
 }
 
 impl<'a> Search<'a> {
-    /// A search that starts at the model's values.
+    /// A search for the parameters `active` that starts at the model's values.
     ///
     /// # Errors
     /// No window, or a model that diverges there.
     pub(super) fn new(
         shooting: &'a Shooting<'a>,
         dynamics: &'a Dynamics,
-        tangent: &'a Tangent,
+        active: &[usize],
         start_states: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Self, FitError> {
@@ -68,8 +68,8 @@ impl<'a> Search<'a> {
         let mut search = Self {
             shooting,
             dynamics,
-            tangent,
-            layout: Layout::new(&dynamics.parameters, &tangent.active, &shooting.windows),
+            tangent: Tangent::new(dynamics, active, shooting.local(&start_states)),
+            layout: Layout::new(&dynamics.parameters, active, &shooting.windows),
             at: Point {
                 values: Values::of(dynamics, shooting.logs),
                 start_states,
@@ -80,11 +80,7 @@ impl<'a> Search<'a> {
             steps: 0,
             trace: Vec::new(),
         };
-        let Point {
-            values,
-            start_states,
-        } = &search.at;
-        let costs = shooting.costs(dynamics, values, start_states, search.scale);
+        let costs = search.costs(&search.at);
         let diverged = costs.iter().filter(|cost| !cost.is_finite()).count();
         if diverged > 0 {
             return Err(FitError::Diverged {
@@ -133,12 +129,13 @@ impl<'a> Search<'a> {
     }
 
     fn cost_at(&self, point: &Point) -> f64 {
-        let Point {
-            values,
-            start_states,
-        } = point;
-        let costs = (self.shooting).costs(self.dynamics, values, start_states, self.scale);
-        costs.iter().sum::<f64>() + self.shooting.prior_cost(&self.layout.columns, values)
+        let prior = (self.shooting).prior_cost(&self.layout.columns, &point.values);
+        self.costs(point).iter().sum::<f64>() + prior
+    }
+
+    /// The loss of each window.
+    fn costs(&self, at: &Point) -> Vec<f64> {
+        (self.shooting).costs(self.dynamics, &at.values, &at.start_states, self.scale)
     }
 
     /// Take a step that has this cost.
@@ -154,12 +151,8 @@ impl<'a> Search<'a> {
 
     /// Estimate the scale from the present residuals; returns whether it hardly changes.
     pub(super) fn rescale(&mut self) -> bool {
-        let before = self.scale;
-        let Point {
-            values,
-            start_states,
-        } = &self.at;
-        let residuals = (self.shooting).residuals(self.dynamics, values, start_states);
+        let (before, at) = (self.scale, &self.at);
+        let residuals = (self.shooting).residuals(self.dynamics, &at.values, &at.start_states);
         self.scale = robust_scale(residuals.into_iter().flatten());
         self.cost = self.cost_at(&self.at);
         (self.scale / before - 1.0).abs() < SETTLED
@@ -171,14 +164,11 @@ impl<'a> Search<'a> {
             values,
             start_states,
         } = &self.at;
-        let shooting = self.shooting;
-        Linearised(shooting.linearise(
-            self.dynamics,
-            self.tangent,
-            values,
-            start_states,
-            self.scale,
-        ))
+        let (dynamics, tangent) = (self.dynamics, &self.tangent);
+        let terms = self
+            .shooting
+            .linearise(dynamics, tangent, values, start_states, self.scale);
+        Linearised(terms)
     }
 
     /// The damped Gauss-Newton step within the parameters' bounds; `damping` is a share of the diagonal of the normal
@@ -271,7 +261,7 @@ impl<'a> Search<'a> {
         } = self.at;
         let bodies = (self.shooting).declared_bodies(&self.layout.columns, &values);
         let fit = Fit {
-            active: self.tangent.active.clone(),
+            active: self.tangent.active,
             cost: self.cost - prior_cost,
             prior_cost,
             columns: self.layout.columns,

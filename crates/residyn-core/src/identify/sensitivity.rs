@@ -1,6 +1,8 @@
+use std::ops::Range;
+
 use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::{Row, Simd, WithSimd};
-use crate::model::{Dynamics, InputLayout};
+use crate::model::{Dynamics, Filter, InputLayout};
 use crate::sim::{Hold, Scheme, StepTorque};
 
 /// Windows that are integrated side by side: two AVX-512 registers or four AVX2 registers of f64.
@@ -22,74 +24,60 @@ pub enum Local {
 /// as one program.
 ///
 /// Outputs: the n accelerations; per joint the derivatives of its acceleration with respect to `q` and `qd`; per active
-/// parameter, and per force if forces are free, the derivatives of all accelerations. dq/dt = qd is assumed. Inputs:
-/// those of the model, with the derivatives of the torques with respect to filter parameters inserted before its
-/// parameters.
+/// parameter, and per force if forces are free, the derivatives of all accelerations. dq/dt = qd is assumed. Of a torque
+/// balance: the n differences, then for each difference its derivatives with respect to the active parameters that it
+/// depends on. Inputs: those of the model, with the derivatives of the torques with respect to filter parameters inserted
+/// before its parameters.
 pub(super) struct Tangent {
     pub program: Program,
     /// The sensor model, if it is not the identity: the n measured angles; per joint their derivatives with respect to
     /// `q` and `qd`; per joint those with respect to active parameters. Inputs: those of the model.
     pub reading: Option<Program>,
     pub joints: usize,
-    /// Number of the model's filters.
-    filters: usize,
+    /// Index of the first parameter among the inputs.
+    pub first_parameter: usize,
     /// Indices into the model's parameters.
     pub active: Vec<usize>,
     /// For a torque balance, the columns that each joint's difference depends on; else empty.
     pub columns_of: Vec<Vec<usize>>,
-    pub local: Local,
+    /// Number of free values of one window.
+    start_states: usize,
 }
 
 impl Tangent {
     pub fn new(dynamics: &Dynamics, active: &[usize], local: Local) -> Self {
-        if local == Local::Nothing {
-            return Self::of_torques(dynamics, active);
-        }
         let (n, layout) = (dynamics.joints, dynamics.layout());
-        let mut graph = Graph::new();
-        let (moving, held) = dynamics.program.inputs().split_at(layout.parameters());
-        let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
-        let slopes = (dynamics.filters.iter())
-            .map(|filter| graph.input(&format!("slope of {}", filter.parameter)))
-            .collect::<Vec<_>>();
-        inputs.extend(held.iter().map(|name| graph.input(name)));
-        let outputs = graph.append(&dynamics.program, &inputs);
-        let accelerations = &outputs[n..];
-        let mut wrt = inputs[layout.states()].to_vec();
-        wrt.extend(active.iter().map(|&k| inputs[layout.parameters() + k]));
-        if local == Local::StateAndForce {
-            wrt.extend(&inputs[layout.driving()]);
-        }
-        let mut jacobian = graph.jacobian(accelerations, &wrt);
-        for (filter, slope) in dynamics.filters.iter().zip(slopes) {
-            let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
-                continue;
-            };
-            let by_torque =
-                graph.jacobian(accelerations, &[inputs[layout.driving_of(filter.joint)]]);
-            for (row, by_torque) in jacobian.iter_mut().zip(by_torque) {
-                row[2 * n + column] = graph.mul(by_torque[0], slope);
+        let first = match local {
+            Local::State | Local::StateAndForce => layout.parameters(),
+            Local::Nothing => layout.parameters_of_balance(),
+        };
+        let model = Differentiated::new(dynamics, first);
+        let (start_states, reading, (program, columns_of)) = match local {
+            Local::State => (
+                2 * n,
+                reading(dynamics, active),
+                model.of_motion(active, 0..0),
+            ),
+            Local::StateAndForce => {
+                let motion = model.of_motion(active, layout.driving());
+                (3 * n, reading(dynamics, active), motion)
             }
-        }
-        let by_states = jacobian.iter().flat_map(|row| &row[..2 * n]);
-        let others = (2 * n..wrt.len()).flat_map(|k| jacobian.iter().map(move |row| &row[k]));
-        let all: Vec<Node> = (accelerations.iter().chain(by_states).chain(others))
-            .copied()
-            .collect();
+            Local::Nothing => (0, None, model.of_torques(active)),
+        };
         Self {
-            program: graph.finish(&all),
-            reading: reading(dynamics, active),
+            program,
+            reading,
             joints: n,
-            filters: dynamics.filters.len(),
+            first_parameter: first + dynamics.filters.len(),
             active: active.to_vec(),
-            columns_of: Vec::new(),
-            local,
+            columns_of,
+            start_states,
         }
     }
 
     /// Columns of the sensitivities: shared parameters, then the window's own free values.
     pub fn columns(&self) -> usize {
-        self.active.len() + self.start_states()
+        self.active.len() + self.start_states
     }
 
     /// The first output with the partial derivatives df/dc of a column c, or `None` if they are zero. Column 0 is the
@@ -106,18 +94,9 @@ impl Tangent {
         }
     }
 
-    /// Index of the first parameter among the inputs.
-    pub fn first_parameter(&self) -> usize {
-        let moving = match self.local {
-            Local::Nothing => 5,
-            Local::State | Local::StateAndForce => 3,
-        };
-        moving * self.joints + 1 + self.filters
-    }
-
     /// For a torque balance: for each joint the columns that its difference depends on, and the outputs with its slopes
     /// with respect to them.
-    pub fn slopes(&self) -> impl Iterator<Item = (&[usize], std::ops::Range<usize>)> {
+    pub fn slopes(&self) -> impl Iterator<Item = (&[usize], Range<usize>)> {
         let mut next = self.joints;
         self.columns_of.iter().map(move |columns| {
             let first = next;
@@ -125,59 +104,93 @@ impl Tangent {
             (columns.as_slice(), first..next)
         })
     }
+}
 
-    /// Number of free values of one window.
-    pub fn start_states(&self) -> usize {
-        match self.local {
-            Local::State => 2 * self.joints,
-            Local::StateAndForce => 3 * self.joints,
-            Local::Nothing => 0,
+/// A model's program in a graph, to be differentiated.
+struct Differentiated<'d> {
+    dynamics: &'d Dynamics,
+    graph: Graph,
+    /// The program's inputs, of which the parameters begin at `first_parameter`.
+    inputs: Vec<Node>,
+    first_parameter: usize,
+    /// The derivatives of the torques with respect to filter parameters.
+    slopes: Vec<Node>,
+    outputs: Vec<Node>,
+}
+
+impl<'d> Differentiated<'d> {
+    fn new(dynamics: &'d Dynamics, first_parameter: usize) -> Self {
+        let mut graph = Graph::new();
+        let (moving, held) = dynamics.program.inputs().split_at(first_parameter);
+        let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
+        let slope = |filter: &Filter| graph.input(&format!("slope of {}", filter.parameter));
+        let slopes = dynamics.filters.iter().map(slope).collect();
+        inputs.extend(held.iter().map(|name| graph.input(name)));
+        Self {
+            outputs: graph.append(&dynamics.program, &inputs),
+            dynamics,
+            graph,
+            inputs,
+            first_parameter,
+            slopes,
         }
     }
 
-    /// For a torque balance: outputs are the n differences, then for each difference its derivatives with respect to
-    /// the active parameters that it depends on.
-    fn of_torques(dynamics: &Dynamics, active: &[usize]) -> Self {
-        let (n, layout) = (dynamics.joints, dynamics.layout());
-        let mut graph = Graph::new();
-        let (moving, held) = (dynamics.program.inputs()).split_at(layout.parameters_of_balance());
-        let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
-        let slopes = (dynamics.filters.iter())
-            .map(|filter| graph.input(&format!("slope of {}", filter.parameter)))
-            .collect::<Vec<_>>();
-        inputs.extend(held.iter().map(|name| graph.input(name)));
-        let differences = graph.append(&dynamics.program, &inputs);
-        let given = inputs.len() - dynamics.parameters.len();
-        let wrt: Vec<Node> = active.iter().map(|&k| inputs[given + k]).collect();
-        let mut jacobian = graph.jacobian(&differences, &wrt);
-        for (filter, slope) in dynamics.filters.iter().zip(slopes) {
+    /// The derivatives of `outputs` with respect to the inputs `states`, to the `active` parameters, which act through
+    /// filters as well, and to the inputs `forces`.
+    fn jacobian(
+        &mut self,
+        outputs: &[Node],
+        states: Range<usize>,
+        active: &[usize],
+        forces: Range<usize>,
+    ) -> Vec<Vec<Node>> {
+        let first_active = states.len();
+        let parameters = active.iter().map(|k| self.first_parameter + k);
+        let wrt = states.chain(parameters).chain(forces);
+        let wrt: Vec<Node> = wrt.map(|input| self.inputs[input]).collect();
+        let mut jacobian = self.graph.jacobian(outputs, &wrt);
+        for (filter, slope) in self.dynamics.filters.iter().zip(&self.slopes) {
             let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
                 continue;
             };
-            let by_torque =
-                graph.jacobian(&differences, &[inputs[layout.driving_of(filter.joint)]]);
+            let torque = self.inputs[self.dynamics.layout().driving_of(filter.joint)];
+            let by_torque = self.graph.jacobian(outputs, &[torque]);
             for (row, by_torque) in jacobian.iter_mut().zip(by_torque) {
-                row[column] = graph.mul(by_torque[0], slope);
+                row[first_active + column] = self.graph.mul(by_torque[0], *slope);
             }
         }
+        jacobian
+    }
+
+    /// The program of [`Tangent`] for a motion; no difference of torques depends on a column.
+    fn of_motion(mut self, active: &[usize], forces: Range<usize>) -> (Program, Vec<Vec<usize>>) {
+        let accelerations = self.outputs.split_off(self.dynamics.joints);
+        let states = self.dynamics.layout().states();
+        let jacobian = self.jacobian(&accelerations, states.clone(), active, forces.clone());
+        let by_states = jacobian.iter().flat_map(|row| &row[states.clone()]);
+        let others = states.end..states.end + active.len() + forces.len();
+        let others = others.flat_map(|k| jacobian.iter().map(move |row| &row[k]));
+        let all = accelerations.iter().chain(by_states).chain(others);
+        let all: Vec<Node> = all.copied().collect();
+        (self.graph.finish(&all), Vec::new())
+    }
+
+    /// The program of [`Tangent`] for a torque balance, and the columns that each difference depends on.
+    fn of_torques(mut self, active: &[usize]) -> (Program, Vec<Vec<usize>>) {
+        let differences = std::mem::take(&mut self.outputs);
+        let jacobian = self.jacobian(&differences, 0..0, active, 0..0);
         let depends = |row: &Vec<Node>| -> Vec<usize> {
-            (0..row.len())
-                .filter(|column| !graph.is_zero(row[*column]))
+            let columns = 0..row.len();
+            columns
+                .filter(|column| !self.graph.is_zero(row[*column]))
                 .collect()
         };
         let columns_of: Vec<Vec<usize>> = jacobian.iter().map(depends).collect();
         let own = jacobian.iter().zip(&columns_of);
         let slopes = own.flat_map(|(row, columns)| columns.iter().map(|column| row[*column]));
         let outputs: Vec<Node> = differences.into_iter().chain(slopes).collect();
-        Self {
-            program: graph.finish(&outputs),
-            reading: None,
-            joints: n,
-            filters: dynamics.filters.len(),
-            active: active.to_vec(),
-            columns_of,
-            local: Local::Nothing,
-        }
+        (self.graph.finish(&outputs), columns_of)
     }
 }
 
@@ -188,10 +201,8 @@ fn reading(dynamics: &Dynamics, active: &[usize]) -> Option<Program> {
     let names = dynamics.program.inputs();
     let inputs: Vec<_> = names.iter().map(|name| graph.input(name)).collect();
     let shown = graph.append(dynamics.reading.as_ref()?, &inputs);
-    let parameters: Vec<_> = active
-        .iter()
-        .map(|&k| inputs[layout.parameters() + k])
-        .collect();
+    let parameters = active.iter().map(|k| inputs[layout.parameters() + k]);
+    let parameters: Vec<_> = parameters.collect();
     let by_state = graph.jacobian(&shown, &inputs[layout.states()]).concat();
     let by_parameter = graph.jacobian(&shown, &parameters).concat();
     Some(graph.finish(&[shown, by_state, by_parameter].concat()))
@@ -221,32 +232,30 @@ pub(super) struct TangentStepper<'t> {
 impl<'t> TangentStepper<'t> {
     pub fn new(tangent: &'t Tangent, values: &[f64], scheme: &'static Scheme) -> Self {
         let n = tangent.joints;
-        let first = tangent.first_parameter();
-        let reading = tangent.reading.as_ref();
-        let reading =
-            reading.map(|reading| reading.tape_at(InputLayout::of(n).parameters(), values));
+        let first_read = InputLayout::of(n).parameters();
         let rows = |count: usize| vec![Row::splat(0.0); count];
         let size = 2 * n * (1 + tangent.columns());
         Self {
             tangent,
             scheme,
             torque: StepTorque::default(),
-            tape: tangent.program.tape_at(first, values),
+            tape: tangent.program.tape_at(tangent.first_parameter, values),
             now: rows(size),
             inner: rows(size),
             next: rows(size),
             sum: rows(size),
             by_state: rows(2 * n * n),
-            reading,
+            reading: (tangent.reading.as_ref()).map(|reading| reading.tape_at(first_read, values)),
             shown: rows(size / 2),
         }
     }
 
     /// Set the value of a parameter in one lane.
     pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
-        self.tape.inputs()[self.tangent.first_parameter() + parameter][lane] = value;
+        self.tape.inputs()[self.tangent.first_parameter + parameter][lane] = value;
         if let Some(reading) = &mut self.reading {
-            reading.inputs()[3 * self.tangent.joints + 1 + parameter][lane] = value;
+            reading.inputs()[InputLayout::of(self.tangent.joints).parameters() + parameter][lane] =
+                value;
         }
     }
 
@@ -385,10 +394,8 @@ impl<'t> TangentStepper<'t> {
     #[inline(always)]
     fn move_with_new_velocities<S: Simd>(&mut self, simd: S, h: &Lane) {
         let n = self.tangent.joints;
-        let columns = self
-            .now
-            .chunks_exact(2 * n)
-            .zip(self.sum.chunks_exact_mut(2 * n));
+        let columns = self.sum.chunks_exact_mut(2 * n);
+        let columns = self.now.chunks_exact(2 * n).zip(columns);
         for (now, sum) in columns {
             for part in 0..Lane::parts::<S>() {
                 for j in 0..n {
@@ -485,7 +492,6 @@ impl WithSimd for Advance<'_, '_> {
     fn with_simd<S: Simd>(mut self, simd: S) {
         let n = self.stepper.tangent.joints;
         let layout = InputLayout::of(n);
-        #[allow(clippy::cast_precision_loss)] // few substeps
         let h = Row(self.length.map(|length| length / self.substeps as f64));
         for part in 0..self.substeps {
             let (tau, slopes) = self.stepper.torque.part(n, part);

@@ -57,15 +57,18 @@ impl<'l> Shooting<'l> {
         // Windows of similar length share a pack, which keeps the padding small.
         order.sort_by_key(|&w| windows[w].rows());
         let half_widths = half_widths(logs);
-        let packs = order
-            .chunks(LANES)
-            .map(|chunk| Pack::new(logs, &windows, chunk, noise, &half_widths))
-            .collect();
+        let pack = |chunk| Pack::new(logs, &windows, chunk, noise, &half_widths);
+        let packs = order.chunks(LANES).map(pack).collect();
+        let measure = Measure::Motion(Arc::new(packs));
+        Self::of(logs, windows, noise, measure)
+    }
+
+    fn of(logs: &'l [Log], windows: Vec<Window>, noise: &[f64], measure: Measure) -> Self {
         Self {
             logs,
             windows,
             noise: noise.to_vec(),
-            measure: Measure::Motion(Arc::new(packs)),
+            measure,
             prior: Prior::default(),
             cuts: Arc::default(),
         }
@@ -82,10 +85,8 @@ impl<'l> Shooting<'l> {
         noise: &[f64],
         smoothing_velocities: &[f64],
     ) -> Self {
-        let rows = logs
-            .par_iter()
-            .map(|log| Rows::of(log, smoothing_velocities));
-        let rows = rows.collect();
+        let of_log = |log| Rows::of(log, smoothing_velocities);
+        let rows = logs.par_iter().map(of_log).collect();
         Self::of_rows(logs, Arc::new(rows), windows, noise)
     }
 
@@ -95,25 +96,12 @@ impl<'l> Shooting<'l> {
         mut windows: Vec<Window>,
         noise: &[f64],
     ) -> Self {
-        windows.retain(|window| {
-            !rows[window.log]
-                .within(&logs[window.log], window)
-                .is_empty()
-        });
+        let within = |window: &Window| rows[window.log].within(&logs[window.log], window);
+        windows.retain(|window| !within(window).is_empty());
         let order: Vec<usize> = (0..windows.len()).collect();
-        let packs = order.chunks(LANES);
-        let packs = packs.map(|chunk| Balance::new(logs, &rows, &windows, chunk, noise));
-        Self {
-            logs,
-            noise: noise.to_vec(),
-            measure: Measure::Torques {
-                packs: Arc::new(packs.collect()),
-                rows,
-            },
-            windows,
-            prior: Prior::default(),
-            cuts: Arc::default(),
-        }
+        let pack = |chunk| Balance::new(logs, &rows, &windows, chunk, noise);
+        let packs = Arc::new(order.chunks(LANES).map(pack).collect());
+        Self::of(logs, windows, noise, Measure::Torques { rows, packs })
     }
 
     /// The logs cut into windows of this length in s; each length is cut only once, however often it is requested.
@@ -204,7 +192,6 @@ impl<'l> Shooting<'l> {
 
     /// The number of residuals that say as much as the declared values do: residuals are correlated, and a few windows
     /// overrule the declared values. In a motion the joints depend on each other; joint torques err independently.
-    #[allow(clippy::cast_precision_loss)] // a few thousand
     fn residuals_of_a_window(&self) -> f64 {
         let residuals = match &self.measure {
             Measure::Motion(_) => {
@@ -282,9 +269,11 @@ impl<'l> Shooting<'l> {
         start_states: &[Vec<f64>],
     ) -> Vec<f64> {
         let residuals = self.residuals(dynamics, values, start_states);
-        let shares = deviations(&residuals, dynamics.joints);
+        let shares = rms_by_joint(&residuals, dynamics.joints);
         let noise = self.noise.iter().zip(shares);
-        noise.map(|(noise, share)| noise * share).collect()
+        noise
+            .map(|(noise, share)| noise * share.max(1e-12))
+            .collect()
     }
 
     /// The Huber loss of each window at residual scale `scale`, including its start state; infinite if the model
@@ -364,17 +353,17 @@ impl<'l> Shooting<'l> {
 }
 
 /// Root mean square of each joint's residuals, `[window][row * joints + joint]`.
-fn deviations(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
+pub(crate) fn rms_by_joint(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0_f64); joints];
-    for row in residuals
+    let rows = residuals
         .iter()
-        .flat_map(|window| window.chunks_exact(joints))
-    {
+        .flat_map(|window| window.chunks_exact(joints));
+    for row in rows {
         for (sum, residual) in sums.iter_mut().zip(row) {
             *sum = (sum.0 + residual * residual, sum.1 + 1.0);
         }
     }
-    let root = |(squares, rows): (f64, f64)| (squares / rows.max(1.0)).sqrt().max(1e-12);
+    let root = |(squares, rows): (f64, f64)| (squares / rows.max(1.0)).sqrt();
     sums.into_iter().map(root).collect()
 }
 
@@ -390,26 +379,21 @@ mod tests {
     use std::sync::Arc;
 
     use super::{Measure, Pack, Shooting, Values};
-    use crate::data::{Joint, Log, Quantity};
-    use crate::identify::cut;
+    use crate::data::{Joint, Log};
     use crate::identify::sensitivity::{Local, Tangent};
-    use crate::model::{FittedEffect, Library};
+    use crate::identify::{cut, free_parameters};
+    use crate::model::{Dynamics, FittedEffect, Library};
 
     /// Two seconds of an arbitrary motion and torque at 100 Hz.
     fn log() -> Log {
         let time: Vec<f64> = (0..200).map(|row| 0.01 * f64::from(row)).collect();
         let column = |f: fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect::<Vec<f64>>()];
         Log {
-            path: "some.csv".into(),
             q: column(|t| 0.01 * (3.0 * t).sin()),
             qd: column(|t| 0.03 * (3.0 * t).cos()),
             tau: column(|t| (20.0 * t).sin() + (31.0 * t).cos()),
-            driven_by: Quantity::Torque,
-            masked: vec![Vec::new()],
-            filled: Vec::new(),
-            leave_out: Vec::new(),
-            notes: Vec::new(),
             time,
+            ..Log::empty(1)
         }
     }
 
@@ -433,6 +417,32 @@ mod tests {
         assert!(!Arc::ptr_eq(&packs(&shooting), &packs(&fine)));
     }
 
+    /// Each free parameter with the gradient of the cost, and the cost after a step of that parameter.
+    fn gradients<'a>(
+        shooting: &'a Shooting<'_>,
+        model: &'a Dynamics,
+        tangent: &'a Tangent,
+        values: &'a [f64],
+        start_states: &'a [Vec<f64>],
+    ) -> impl Iterator<Item = (usize, f64, impl Fn(f64) -> f64 + 'a)> + 'a {
+        let point = |common: Vec<f64>| {
+            let own = Vec::new();
+            Values { common, own }
+        };
+        let terms = shooting.linearise(model, tangent, &point(values.to_vec()), start_states, 1.0);
+        assert!(terms.len() > 1);
+        tangent.active.iter().enumerate().map(move |(column, &k)| {
+            let found = terms.iter().map(|terms| terms.gradient[column]).sum();
+            let cost = move |step: f64| -> f64 {
+                let mut moved = values.to_vec();
+                moved[k] += step;
+                let costs = shooting.costs(model, &point(moved), start_states, 1.0);
+                costs.iter().sum()
+            };
+            (k, found, cost)
+        })
+    }
+
     #[test]
     fn gradients_of_torques_are_slopes_of_the_cost() {
         let library = Library::built_in();
@@ -450,35 +460,14 @@ mod tests {
         let logs = [log];
         let shooting = Shooting::of_torques(&logs, cut(&logs, 0.5), &[0.5, 0.2], &[0.01; 2]);
         let start_states = shooting.initial_start_states(0);
-        let free = |k: &usize| !model.parameters[*k].fixed;
-        let active: Vec<usize> = (0..model.parameters.len()).filter(free).collect();
-        let tangent = Tangent::new(&model, &active, Local::Nothing);
+        let tangent = Tangent::new(&model, &free_parameters(&model), Local::Nothing);
         let mut values = model.values();
         let first = values.len() - 3;
         values[first..].copy_from_slice(&[0.0073, 0.015, 0.1]);
-        let point = |values: &[f64]| Values {
-            common: values.to_vec(),
-            own: Vec::new(),
-        };
-        let cost = |values: &[f64]| -> f64 {
-            let costs = shooting.costs(&model, &point(values), &start_states, 1.0);
-            costs.iter().sum()
-        };
-        let terms = shooting.linearise(&model, &tangent, &point(&values), &start_states, 1.0);
-        assert!(terms.len() > 1);
-        for (column, k) in active.into_iter().enumerate() {
-            let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
-            let moved = |step: f64| {
-                let mut moved = values.clone();
-                moved[k] += step;
-                cost(&moved)
-            };
-            let wanted = (moved(1e-6) - moved(-1e-6)) / 2e-6;
-            assert!(
-                (found - wanted).abs() < 1e-2 * wanted.abs().max(1e-6),
-                "{}: {found} {wanted}",
-                model.parameters[k].name
-            );
+        for (k, found, cost) in gradients(&shooting, &model, &tangent, &values, &start_states) {
+            let wanted = (cost(1e-6) - cost(-1e-6)) / 2e-6;
+            let off = (found - wanted).abs() / wanted.abs().max(1e-6);
+            assert!(off < 1e-2, "{}: {found} {wanted}", model.parameters[k].name);
         }
     }
 
@@ -497,26 +486,14 @@ mod tests {
             let tangent = Tangent::new(&model, &[1, 2, 3, 4], local);
             for (delay, lag) in [(0.0, 0.0), (0.0073, 0.015)] {
                 let values = [15.0, 3.0, delay, lag, 0.01, 0.0];
-                let point = |values: &[f64]| Values {
-                    common: values.to_vec(),
-                    own: Vec::new(),
-                };
-                let cost = |values: &[f64]| -> f64 {
-                    shooting
-                        .costs(&model, &point(values), &start_states, 1.0)
-                        .iter()
-                        .sum()
-                };
-                let terms =
-                    shooting.linearise(&model, &tangent, &point(&values), &start_states, 1.0);
-                for (column, k) in [1, 2, 3, 4].into_iter().enumerate() {
-                    let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
-                    let mut moved = values;
-                    moved[k] += 1e-7;
-                    let wanted = (cost(&moved) - cost(&values)) / 1e-7;
+                for (k, found, cost) in
+                    gradients(&shooting, &model, &tangent, &values, &start_states)
+                {
+                    let wanted = (cost(1e-7) - cost(0.0)) / 1e-7;
+                    let off = (found - wanted).abs() / wanted.abs();
                     assert!(
-                        (found - wanted).abs() < 1e-4 * wanted.abs(),
-                        "{local:?}, parameter {k} at {delay}, {lag}: {found} {wanted}"
+                        off < 1e-4,
+                        "{local:?}, {k} at {delay}, {lag}: {found} {wanted}"
                     );
                 }
             }

@@ -21,7 +21,6 @@ impl Start {
     pub fn of(log: &Log, row: usize, half_width: f64, noise: &[f64]) -> Self {
         let around = rows_around(&log.time, row, half_width);
         let is_between = row - around.start >= FEWEST_ROWS && around.end - row > FEWEST_ROWS;
-        #[allow(clippy::cast_precision_loss)] // few rows
         let rows = around.len() as f64;
         let gains = [
             LocalCubic::value_noise_gain(rows),

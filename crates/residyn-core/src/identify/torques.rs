@@ -2,6 +2,7 @@ use super::fit::fit_by;
 use super::outcome::{Fit, FitError};
 use super::shooting::Shooting;
 use super::solver::Solver;
+use super::values::free_parameters;
 use crate::data::Log;
 use crate::model::Model;
 use crate::model::chain::physical_parts;
@@ -40,9 +41,7 @@ pub fn fit_torques<'l>(
     for _ in 0..FITS {
         let balance = model.smoothed_torque_balance().ok_or(FitError::NoWindow)?;
         let shooting = smoothed.with_noise(&noise);
-        let parameters = balance.parameters.iter().enumerate();
-        let free = parameters.filter(|(_, parameter)| !parameter.fixed);
-        let active: Vec<usize> = free.map(|(k, _)| k).collect();
+        let active = free_parameters(&balance);
         let start_states = shooting.initial_start_states(0);
         let (values, fitted) = fit_by(solver, &shooting, &balance, &active, start_states, None)?;
         let balance = values.put_into(&balance, logs);

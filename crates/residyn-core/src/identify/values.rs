@@ -64,6 +64,15 @@ impl Values {
         values
     }
 
+    /// Call `set(parameter, lane, value)` for every value of one log, for each lane of windows of that log.
+    pub(super) fn by_lane(&self, logs: &[usize], mut set: impl FnMut(usize, usize, f64)) {
+        for own in &self.own {
+            for lane in (0..logs.len()).filter(|&lane| logs[lane] == own.log) {
+                set(own.parameter, lane, own.value);
+            }
+        }
+    }
+
     /// The value of a free value of a fit.
     pub fn get(&self, column: Column) -> f64 {
         let is_it = |own: &&Own| Some(own.log) == column.log && own.parameter == column.parameter;
@@ -102,6 +111,14 @@ impl Values {
             }),
         }
     }
+}
+
+/// The parameters of a model that its file does not fix.
+pub(crate) fn free_parameters(dynamics: &Dynamics) -> Vec<usize> {
+    let parameters = &dynamics.parameters;
+    (0..parameters.len())
+        .filter(|&k| !parameters[k].fixed)
+        .collect()
 }
 
 /// One free value of a fit.

@@ -3,7 +3,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::Named;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::closeloop::select::{candidates, left_out_losses, starts};
+use crate::closeloop::select::{Folds, candidates, left_out_losses, starts};
 use crate::closeloop::settings::Settings;
 use crate::identify::{Fit, FitError, as_it_stands, fit, squared_distance, uncertainty};
 use crate::model::FittedEffect;
@@ -51,19 +51,13 @@ pub(super) fn detection_limits(
     let baseline = Baseline::new(problem, accepted)?;
     let all = candidates(problem, &accepted.model.effects);
     let trials: usize = all.iter().map(|candidate| starts(candidate).len()).sum();
-    #[allow(clippy::cast_precision_loss)] // few trials
     let level = problem.settings.establish.false_alarm / trials.max(1) as f64;
-    Ok(all
-        .into_iter()
-        .map(|candidate| {
-            let smallest = baseline.size(&candidate, level);
-            DetectionLimit {
-                effect: candidate,
-                smallest,
-                named: None,
-            }
-        })
-        .collect())
+    let limit = |effect: FittedEffect| DetectionLimit {
+        smallest: baseline.size(&effect, level),
+        effect,
+        named: None,
+    };
+    Ok(all.into_iter().map(limit).collect())
 }
 
 /// An accepted model on the logs that effects are chosen by.
@@ -77,20 +71,13 @@ struct Baseline<'a> {
 
 impl<'a> Baseline<'a> {
     fn new(problem: &'a Problem<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
-        let dynamics = accepted.model.dynamics();
+        let (dynamics, shooting) = (accepted.model.dynamics(), &problem.shooting);
         let scale = accepted.fit.scale;
-        let states = problem.shooting.initial_start_states(0);
-        let (_, free) = fit(&problem.shooting, &dynamics, &[], states, Some(scale))?;
-        let start_states = free.start_states;
-        let active = &accepted.fit.active;
-        let fit = as_it_stands(
-            &problem.shooting,
-            &dynamics,
-            active,
-            start_states.clone(),
-            scale,
-        )?;
-        let loss = left_out_losses(problem, &fit).iter().sum();
+        let states = shooting.initial_start_states(0);
+        let (_, free) = fit(shooting, &dynamics, &[], states, Some(scale))?;
+        let (active, start_states) = (&accepted.fit.active, free.start_states);
+        let fit = as_it_stands(shooting, &dynamics, active, start_states.clone(), scale)?;
+        let loss = left_out_losses(&Folds::of(problem), &fit).iter().sum();
         Ok(Self {
             problem,
             accepted,
@@ -108,10 +95,9 @@ impl<'a> Baseline<'a> {
             return Smallest::NotComputed;
         }
         // A per-log value is taken to be the same in all logs, but one value per log is tested.
-        let tested = if parameters.iter().any(|p| p.per_log) {
-            switches.len() * self.problem.logs.len()
-        } else {
-            switches.len()
+        let tested = match parameters.iter().any(|p| p.per_log) {
+            true => switches.len() * self.problem.logs.len(),
+            false => switches.len(),
         };
         let mut common = candidate.clone();
         for parameter in &mut common.effect.parameters {
@@ -124,12 +110,12 @@ impl<'a> Baseline<'a> {
             .flat_map(|start| switches.iter().map(move |&switch| (start, switch)));
         let sizes: Vec<(usize, Vec<f64>)> = tried
             .filter_map(|(start, switch)| {
-                let Ok(size) = self.smallest(start, switch, tested, level) else {
+                let Ok(fit) = self.with(start, switch) else {
                     none = Smallest::Diverged;
                     return None;
                 };
                 let mut values: Vec<f64> = start.values.iter().map(|(value, _)| *value).collect();
-                values[switch] = size?;
+                values[switch] = self.smallest_by(&fit, tested, level)?;
                 (candidate.effect.is_valid(&values)).then_some((switch, values))
             })
             .collect();
@@ -143,19 +129,7 @@ impl<'a> Baseline<'a> {
             })
     }
 
-    /// The smallest size of one switch, the other parameters as they are, in a test of all `switches`.
-    fn smallest(
-        &self,
-        start: &FittedEffect,
-        switch: usize,
-        switches: usize,
-        level: f64,
-    ) -> Result<Option<f64>, FitError> {
-        let fit = self.with(start, switch)?;
-        Ok(self.smallest_by(&fit, switches, level))
-    }
-
-    /// The smallest size of the last free value of a fit; `None` if the motion does not distinguish it from the others.
+    /// The smallest size of the last free value of a fit, in a test of all `switches`; `None` if the motion does not distinguish it from the others.
     fn smallest_by(&self, fit: &Fit, switches: usize, level: f64) -> Option<f64> {
         let Settings {
             establish: settings,
@@ -203,7 +177,6 @@ fn own_information(fit: &Fit, least: f64) -> Option<f64> {
 
 /// Standard deviations from zero at which one of `switches` switches is significant at level `p`: the threshold of
 /// Hotelling's test. `None` for too few blocks.
-#[allow(clippy::cast_precision_loss)] // few blocks
 fn critical(p: f64, switches: usize, blocks: usize) -> Option<f64> {
     let (q, freedom) = (switches as f64, blocks as f64 - switches as f64);
     let law = FisherSnedecor::new(q, freedom).ok()?;

@@ -21,7 +21,7 @@ use super::problem::Problem;
 use super::stage::{Stage, Watch};
 use crate::data::Joint;
 use crate::data::statistics::wilson;
-use crate::model::{FittedEffect, Model, Status};
+use crate::model::{FittedEffect, Model};
 use crate::streams::{Purpose, stream};
 
 /// The results of the search on logs simulated from the accepted model, with the torques and the noise of the user's
@@ -54,7 +54,6 @@ impl Calibration {
     }
 
     /// Share of simulations in which something was named.
-    #[allow(clippy::cast_precision_loss)] // few runs
     pub fn rate(&self) -> f64 {
         self.alarms() as f64 / self.named.len().max(1) as f64
     }
@@ -73,9 +72,8 @@ fn hidden(limit: &DetectionLimit, multiple: f64) -> Option<FittedEffect> {
     let mut hidden = limit.effect.clone();
     hidden.values = values.iter().map(|value| (*value, None)).collect();
     hidden.values[*switch].0 *= multiple;
-    COMMON
-        .contains(&hidden.effect.name.as_str())
-        .then_some(hidden)
+    let is_common = COMMON.contains(&hidden.effect.name.as_str());
+    is_common.then_some(hidden)
 }
 
 /// An effect that the search established.
@@ -157,17 +155,16 @@ impl<'a> Calibrator<'a> {
         let common = limits.iter().filter_map(|limit| hidden(limit, multiple));
         let all = std::iter::repeat_n(None, runs).chain(common.map(Some));
         let seed = rng.random();
+        let simulation = |(number, hidden)| Simulation {
+            number,
+            seed,
+            hidden,
+        };
         Ok(Self {
             problem,
             declared: accepted.model.clone(),
             simulated: SimulatedLogs::new(problem, accepted)?,
-            simulations: (all.enumerate())
-                .map(|(number, hidden)| Simulation {
-                    number,
-                    seed,
-                    hidden,
-                })
-                .collect(),
+            simulations: all.enumerate().map(simulation).collect(),
             limits,
         })
     }
@@ -199,10 +196,8 @@ impl<'a> Calibrator<'a> {
         };
         watch.see(Stage::Fit.into());
         let found = find(problem.fit_declared()?, &[], &mut rng, watch)?;
-        let established = found.chosen.standings.iter();
-        let established = established.filter(|s| s.status == Status::Established);
         Ok(Some(Searched {
-            named: established.map(|s| Named::of(&s.effect)).collect(),
+            named: found.chosen.named().map(Named::of).collect(),
             unexplained: found.unexplained.is_significant(),
         }))
     }

@@ -3,7 +3,7 @@ use rand::{Rng, RngExt};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::data::{Log, half_width_s, row_from};
-use crate::identify::{FitError, Values, Window, blocks, fit};
+use crate::identify::{FitError, Values, Window, blocks, count, fit};
 use crate::model::FittedEffect;
 
 /// The training logs as they would be if an accepted model were the truth.
@@ -54,16 +54,12 @@ impl<'a> SimulatedLogs<'a> {
         let dynamics = self.problem.extended(self.accepted, more);
         let values = Values::of(&dynamics, &self.apart);
         let rig = self.problem.on(&self.apart);
-        let motion = rig
-            .shooting
-            .residuals(&dynamics, &values, &self.start_states);
+        let motion = (rig.shooting).residuals(&dynamics, &values, &self.start_states);
         if motion.iter().flatten().any(|x| !x.is_finite()) {
             return None;
         }
-        let blocks = self.members.last().map_or(0, |last| last + 1);
-        let signs: Vec<f64> = (0..blocks)
-            .map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 })
-            .collect();
+        let mut sign = |_| if rng.random::<bool>() { 1.0 } else { -1.0 };
+        let signs: Vec<f64> = (0..count(&self.members)).map(&mut sign).collect();
         let mut logs = self.apart.clone();
         for (w, window) in self.windows.iter().enumerate() {
             let sign = signs[self.members[w]];
@@ -85,17 +81,13 @@ impl<'a> SimulatedLogs<'a> {
 fn apart(problem: &Problem<'_>) -> Vec<Log> {
     let pause = problem.settings.calibrate.pause_half_widths;
     let windows = &problem.shooting.windows;
-    let block = |index: usize, log: &Log| {
+    let block = |(index, log): (usize, &Log)| {
         let reach = half_width_s(log.median_step());
         let mut out = Log {
-            time: Vec::new(),
-            q: vec![Vec::new(); log.joints()],
-            qd: vec![Vec::new(); log.joints()],
-            tau: vec![Vec::new(); log.joints()],
-            masked: vec![Vec::new(); log.joints()],
-            filled: Vec::new(),
-            leave_out: Vec::new(),
-            ..log.clone()
+            path: log.path.clone(),
+            driven_by: log.driven_by,
+            notes: log.notes.clone(),
+            ..Log::empty(log.joints())
         };
         for window in windows.iter().filter(|window| window.log == index) {
             let before = row_from(&log.time, log.time[window.first] - reach);
@@ -114,7 +106,5 @@ fn apart(problem: &Problem<'_>) -> Vec<Log> {
         }
         out
     };
-    (problem.logs.iter().enumerate())
-        .map(|(index, log)| block(index, log))
-        .collect()
+    problem.logs.iter().enumerate().map(block).collect()
 }

@@ -4,57 +4,36 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::closeloop::fit::{Declared, NOTHING};
-use crate::closeloop::settings::Settings;
-use crate::closeloop::tests::{pendulum, recorded};
+use crate::closeloop::tests::{Study, pendulum, recorded};
 use crate::data::Log;
-use crate::model::Library;
 
 const RIG: &str = r#"
 model = "pendulum"
-
-[parameters]
-C_g = -17.4
-C_i = 4.6
-
-[sensor]
-rate_hz = 100
-position_noise = 5e-4
-position_step = 1.5339807878856412e-3
-
-[excitation]
-amplitude = [1.6]
-band_hz = [0.15, 2.0]
-tones = 8
-
-[recording]
-logs = 3
-duration_s = 8
-start = [0, 0]
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 1.5339807878856412e-3 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
+recording = { logs = 3, duration_s = 8, start = [0, 0] }
 "#;
 
-fn coulomb(level: f64) -> String {
-    format!("[[effect]]\nname = \"coulomb_friction\"\njoint = 1\nF_c = {level}\n")
+/// A study of the rig without friction.
+fn study() -> Study {
+    Study::of(pendulum(), RIG)
 }
 
-/// Logs of the rig, with `more` added to its file.
-fn logs(more: &str, seed: u64) -> Vec<Log> {
-    recorded(&format!("{RIG}\n{more}"), seed)
+/// Logs of the rig with this level of dry friction.
+fn with_friction(level: f64, seed: u64) -> Vec<Log> {
+    let effect = format!("{{ name = \"coulomb_friction\", joint = 1, F_c = {level} }}");
+    recorded(&format!("{RIG}effect = [{effect}]"), seed)
 }
 
 #[test]
 fn simulated_logs_have_the_windows_of_the_original_logs() {
-    let (declared, logs) = (pendulum(), logs("", 0));
-    let settings = Settings::default();
-    let problem = Problem::new(&declared, &NOTHING, &logs, &settings);
-    let Declared {
-        problem,
-        fitted: accepted,
-    } = problem.fit_declared().unwrap();
+    let study = study();
+    let declared = study.closed().fit_declared().unwrap();
+    let (problem, accepted) = (declared.problem, declared.fitted);
     let simulated = SimulatedLogs::new(&problem, &accepted).unwrap();
-    let drawn = simulated
-        .draw(&[], &mut ChaCha8Rng::seed_from_u64(0))
-        .unwrap();
+    let rng = &mut ChaCha8Rng::seed_from_u64(0);
+    let drawn = simulated.draw(&[], rng).unwrap();
     let again = problem.on(&drawn);
     let (before, after) = (&problem.shooting, &again.shooting);
     assert_eq!(before.windows.len(), after.windows.len());
@@ -71,17 +50,15 @@ fn simulated_logs_have_the_windows_of_the_original_logs() {
         shooting.residuals(dynamics, &values, &found.start_states)
     };
     let mut turned = 0;
-    for (window, (old, new)) in residuals(&problem)
-        .iter()
-        .zip(residuals(&again))
-        .enumerate()
-    {
-        let sign = if old.iter().zip(&new).map(|(a, b)| a * b).sum::<f64>() > 0.0 {
-            1.0
-        } else {
-            turned += 1;
-            -1.0
-        };
+    let both = residuals(&problem).into_iter().zip(residuals(&again));
+    for (window, (old, new)) in both.enumerate() {
+        let sign = old
+            .iter()
+            .zip(&new)
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
+            .signum();
+        turned += usize::from(sign < 0.0);
         let off = old.iter().zip(&new).map(|(a, b)| (a - sign * b).abs());
         let off = off.fold(0.0, f64::max);
         // Both fits end when a step gains less than 1e-4 of the loss.
@@ -92,28 +69,18 @@ fn simulated_logs_have_the_windows_of_the_original_logs() {
 
 #[test]
 fn complete_models_raise_no_false_alarm_and_hidden_effects_are_named() {
-    let (declared, library, logs) = (pendulum(), Library::built_in(), logs("", 0));
-    let settings = Settings::default();
-    let problem = Problem::new(&declared, &library, &logs, &settings);
-    let Declared {
-        problem,
-        fitted: accepted,
-    } = problem.fit_declared().unwrap();
-    let repeat = |runs: usize| {
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let calibrator = Calibrator::new(&problem, &accepted, runs, &mut rng).unwrap();
-        let search = |simulation| calibrator.search(simulation, &()).unwrap();
-        let searched = calibrator.simulations().iter().map(search).collect();
-        calibrator.conclude(searched)
-    };
-    let found = repeat(8);
+    let study = study();
+    let declared = study.fitted();
+    let (problem, accepted) = (declared.problem, declared.fitted);
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let calibrator = Calibrator::new(&problem, &accepted, 8, &mut rng).unwrap();
+    let search = |simulation| calibrator.search(simulation, &()).unwrap();
+    let searched = calibrator.simulations().iter().map(search).collect();
+    let found = calibrator.conclude(searched);
     // At the nominal 5 %, two alarms in eight have a probability of 6 %, three one of 0.6 %.
     assert!(found.alarms() <= 2, "{:?}", found.named);
-    let tried: Vec<_> = found
-        .limits
-        .iter()
-        .filter_map(DetectionLimit::verified)
-        .collect();
+    let limits = found.limits.iter();
+    let tried: Vec<_> = limits.filter_map(DetectionLimit::verified).collect();
     // The drive's gain cannot be distinguished from the pendulum's constants.
     assert_eq!(tried, [true; 3]);
     let gain = |limit: &&DetectionLimit| limit.effect.effect.name == "actuator_gain";
@@ -124,15 +91,9 @@ fn complete_models_raise_no_false_alarm_and_hidden_effects_are_named() {
 #[test]
 fn friction_is_named_above_its_detection_limit() {
     const SEEDS: u64 = 4;
-    let (declared, library) = (pendulum(), Library::built_in());
-    let bare = logs("", 0);
-    let settings = Settings::default();
-    let problem = Problem::new(&declared, &library, &bare, &settings);
-    let Declared {
-        problem,
-        fitted: accepted,
-    } = problem.fit_declared().unwrap();
-    let limits = detection_limits(&problem, &accepted).unwrap();
+    let study = study();
+    let bare = study.fitted();
+    let limits = detection_limits(&bare.problem, &bare.fitted).unwrap();
     let friction = |limit: &&DetectionLimit| limit.effect.effect.name == "coulomb_friction";
     let Smallest::Detectable { values, .. } = &limits.iter().find(friction).unwrap().smallest
     else {
@@ -141,13 +102,17 @@ fn friction_is_named_above_its_detection_limit() {
     let smallest = values[0];
     let named = |level: f64| {
         let named = |seed: &u64| {
-            let logs = logs(&coulomb(level), 100 + seed);
-            let problem = Problem::new(&declared, &library, &logs, &settings);
+            let logs = with_friction(level, 100 + seed);
+            let Study {
+                declared,
+                library,
+                settings,
+                ..
+            } = &study;
+            let problem = Problem::new(declared, library, &logs, settings);
             let rng = &mut ChaCha8Rng::seed_from_u64(*seed);
             let found = find(problem.fit_declared().unwrap(), &[], rng, &()).unwrap();
-            let standings = found.chosen.standings.iter();
-            let established = standings.filter(|s| s.status == Status::Established);
-            let labels = established.map(|s| s.effect.label());
+            let labels = found.chosen.named().map(FittedEffect::label);
             labels.collect::<Vec<_>>() == ["coulomb_friction on joint 1"]
         };
         (0..SEEDS).filter(named).count()

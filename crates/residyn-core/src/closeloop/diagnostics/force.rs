@@ -39,12 +39,8 @@ pub(in crate::closeloop) fn residual_force(
     let logs = problem.logs.iter();
     let torques: Vec<Vec<Vec<f64>>> = logs.map(|log| fitted.model.drive_torques(log)).collect();
     let sample = |(window, force): (&Window, &Vec<f64>)| {
-        ForceSample::over(
-            window,
-            &problem.logs[window.log],
-            &torques[window.log],
-            force,
-        )
+        let (log, tau) = (&problem.logs[window.log], &torques[window.log]);
+        ForceSample::over(window, log, tau, force)
     };
     let blocks = shooting.windows.iter().zip(&forces);
     let mut samples: Vec<ForceSample> = blocks.map(sample).collect();
@@ -88,7 +84,6 @@ impl ForceSample {
     /// The sample of one block of a log, with these torques and the force found there.
     fn over(window: &Window, log: &Log, tau: &[Vec<f64>], force: &[f64]) -> Self {
         let rows = window.first..=window.last;
-        #[allow(clippy::cast_precision_loss)] // few rows
         let count = window.rows() as f64;
         let mean = |column: &Vec<f64>| rows.clone().map(|row| column[row]).sum::<f64>() / count;
         let span = log.time[window.last] - log.time[window.first];

@@ -144,11 +144,7 @@ impl Test {
                 .map(|j| (1.0 - noise[j] / found.all[j].max(f64::MIN_POSITIVE)).max(0.0))
                 .collect(),
             fraction: share(left.iter().sum(), declared.iter().sum()),
-            fractions: left
-                .iter()
-                .zip(&declared)
-                .map(|(l, d)| share(*l, *d))
-                .collect(),
+            fractions: (0..joints).map(|j| share(left[j], declared[j])).collect(),
         }
     }
 }
@@ -194,17 +190,15 @@ fn windows(problem: &Problem<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Wind
     let sensors = sensors(problem);
     let order = problem.joints_by_motion();
     let at = residuals(&fitted.fit.start_states);
-    let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)
-        .map(|k| {
-            let mut start_states = fitted.fit.start_states.clone();
-            start_states
-                .iter_mut()
-                .for_each(|local| local[k] += start_step);
-            residuals(&start_states)
-        })
-        .collect();
-    chosen
-        .iter()
+    let vary = |k: usize| {
+        let mut start_states = fitted.fit.start_states.clone();
+        for local in &mut start_states {
+            local[k] += start_step;
+        }
+        residuals(&start_states)
+    };
+    let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints).map(vary).collect();
+    (chosen.iter())
         .map(|&w| {
             let window = shooting.windows[w];
             let rows = window.rows();
@@ -235,14 +229,10 @@ fn sensors(problem: &Problem<'_>) -> Vec<Vec<[f64; 2]>> {
             let (step, seen) = (joints[j].q.resolution, joints[j].q.noise_std);
             let noise = (seen * seen - step * step / 12.0).max(0.0).sqrt();
             // If the audit finds neither, any noise will do: shares do not depend on its size.
-            [
-                if step > 0.0 {
-                    noise
-                } else {
-                    problem.shooting.noise[j]
-                },
-                step,
-            ]
+            match step > 0.0 {
+                true => [noise, step],
+                false => [problem.shooting.noise[j], step],
+            }
         };
         (0..joints.len()).map(sensor).collect()
     };
@@ -251,10 +241,8 @@ fn sensors(problem: &Problem<'_>) -> Vec<Vec<[f64; 2]>> {
 
 /// The slowest waves of the discrete cosine transform over the rows, at most half of all.
 fn waves(rows: usize, slow: usize) -> DMatrix<f64> {
-    #[allow(clippy::cast_precision_loss)] // few rows
     let count = rows as f64;
     DMatrix::from_fn(rows, (slow + 1).min(rows / 2), |row, wave| {
-        #[allow(clippy::cast_precision_loss)]
         let phase = PI * wave as f64 * (row as f64 + 0.5) / count;
         phase.cos() * ((if wave == 0 { 1.0 } else { 2.0 }) / count).sqrt()
     })
@@ -289,16 +277,6 @@ impl Window {
     }
 }
 
-/// Slow and total energy of a window's signal, one pair a joint.
-fn energies(joints: usize, signal: &DVector<f64>, waves: &DMatrix<f64>) -> Vec<[f64; 2]> {
-    let of_joint = |j: usize| {
-        let own = signal.iter().skip(j).step_by(joints).copied();
-        let own = DVector::from_vec(own.collect());
-        [waves.tr_mul(&own).norm_squared(), own.norm_squared()]
-    };
-    (0..joints).map(of_joint).collect()
-}
-
 /// Energies of one set of residuals, one a joint.
 struct Energies {
     /// Mean of the smooth share over the windows.
@@ -317,7 +295,10 @@ impl Energies {
         };
         let count = windows.len() as f64;
         for (window, waves) in windows.iter().zip(waves) {
-            for (j, [smooth, all]) in energies(joints, window, waves).into_iter().enumerate() {
+            for j in 0..joints {
+                let own = window.iter().skip(j).step_by(joints).copied();
+                let own = DVector::from_vec(own.collect());
+                let (smooth, all) = (waves.tr_mul(&own).norm_squared(), own.norm_squared());
                 sums.shares[j] += smooth / all.max(f64::MIN_POSITIVE) / count;
                 sums.smooth[j] += smooth;
                 sums.all[j] += all;

@@ -103,35 +103,30 @@ struct Sum {
 
 /// The sum with one more term, the one that lowers the loss most.
 fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -> Option<Sum> {
-    let mut screened: Vec<(Vec<Term>, FittedEffect, f64)> = TERMS
-        .par_iter()
-        .filter(|term| !terms.contains(term))
-        .filter_map(|term| {
-            let terms = [terms, &[*term]].concat();
-            let effect = effect(&terms);
-            if !problem.error_model.shows(&effect) {
-                return None;
-            }
-            let effect = FittedEffect::absent(&effect, joint);
-            let start = best_start(problem, model, &effect)?;
-            let cost = screened_cost(problem, model, &start)?;
-            Some((terms, start, cost))
-        })
-        .collect();
+    let screen = |term: &Term| {
+        let terms = [terms, &[*term]].concat();
+        let effect = effect(&terms);
+        if !problem.error_model.shows(&effect) {
+            return None;
+        }
+        let start = best_start(problem, model, &FittedEffect::absent(&effect, joint))?;
+        let cost = screened_cost(problem, model, &start)?;
+        Some((terms, start, cost))
+    };
+    let others = TERMS.par_iter().filter(|term| !terms.contains(term));
+    let mut screened: Vec<(Vec<Term>, FittedEffect, f64)> = others.filter_map(screen).collect();
     screened.sort_by(|a, b| a.2.total_cmp(&b.2));
     screened.truncate(problem.settings.proposal.fitted_terms);
-    let fitted: Vec<Sum> = screened
-        .into_par_iter()
-        .filter_map(|(terms, start, _)| {
-            let longer = model.effects_and(&[start]);
-            let fitted = problem.with_effects(model, longer).ok()?;
-            Some(Sum {
-                terms,
-                losses: Losses::of(problem, &fitted).of_joint(joint),
-                effect: fitted.model.effects.last()?.clone(),
-            })
+    let fit = |(terms, start, _): (Vec<Term>, FittedEffect, f64)| {
+        let longer = model.effects_and(&[start]);
+        let fitted = problem.with_effects(model, longer).ok()?;
+        Some(Sum {
+            terms,
+            losses: Losses::of(problem, &fitted).of_joint(joint),
+            effect: fitted.model.effects.last()?.clone(),
         })
-        .collect();
+    };
+    let fitted: Vec<Sum> = screened.into_par_iter().filter_map(fit).collect();
     let loss = |sum: &Sum| sum.losses.iter().sum::<f64>();
     (fitted.into_iter()).min_by(|a, b| loss(a).total_cmp(&loss(b)))
 }
@@ -146,17 +141,13 @@ impl Sum {
     }
 
     fn magnitudes(&self) -> Vec<f64> {
-        self.effect
-            .values
-            .iter()
-            .map(|(value, _)| value.abs())
-            .collect()
+        let values = self.effect.values.iter();
+        values.map(|(value, _)| value.abs()).collect()
     }
 }
 
 /// Three significant digits, without an exponent.
 fn digits(value: f64) -> String {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 0 and 12
     let places = (2.0 - value.abs().max(1e-10).log10().floor()).clamp(0.0, 12.0) as usize;
     format!("{value:.places$}")
 }
@@ -168,11 +159,8 @@ fn effect(terms: &[Term]) -> Effect {
 
 /// An effect file with one coefficient a term, with these typical magnitudes.
 fn file(terms: &[Term], magnitudes: &[f64]) -> String {
-    let sum: Vec<String> = terms
-        .iter()
-        .zip(1..)
-        .map(|((term, _), k)| format!("c_{k}*{term}"))
-        .collect();
+    let weighed = |((term, _), k): (&Term, usize)| format!("c_{k}*{term}");
+    let sum: Vec<String> = terms.iter().zip(1..).map(weighed).collect();
     let mut text = format!(
         "[effect]\nname = \"proposed\"\nabout = \"a formula fitted to the residual; not a finding\"\n\
          force = \"{}\"\n\n[parameters]\n",
@@ -196,27 +184,21 @@ fn unit([q, qd, tau, t]: [i32; 4]) -> String {
         1 => Some(unit.to_owned()),
         _ => Some(format!("{unit}^{power}")),
     };
-    let listed =
-        |parts: &[Option<String>]| -> Vec<String> { parts.iter().flatten().cloned().collect() };
     // The torque that the term gives, over the torques in it; seconds count on both sides.
-    let force = match tau {
-        0 => Some("N m".to_owned()),
-        _ => None,
-    };
-    let over = listed(&[
-        if tau > 1 {
-            powers("(N m)", tau - 1)
-        } else {
-            None
-        },
+    let above = [
+        powers("N m", i32::from(tau == 0)),
+        powers("s", qd - qd.min(t)),
+    ];
+    let over = [
+        powers("(N m)", (tau - 1).max(0)),
         powers("rad", q + qd),
         powers("s", t - qd.min(t)),
-    ]);
-    let above = listed(&[force, powers("s", qd - qd.min(t))]);
-    let above = if above.is_empty() {
-        "1".to_owned()
-    } else {
-        above.join(" ")
+    ];
+    let [above, over] = [Vec::from(above), Vec::from(over)]
+        .map(|parts| -> Vec<String> { parts.into_iter().flatten().collect() });
+    let above = match above.is_empty() {
+        true => "1".to_owned(),
+        false => above.join(" "),
     };
     match over.as_slice() {
         [] => above,

@@ -21,18 +21,12 @@ impl ResidualForce {
         fitted: &Fitted,
     ) -> Result<Self, FitError> {
         let samples = residual_force(problem, fitted)?;
-        Ok(Self {
-            curves: curves(
-                &samples,
-                &problem.declared.prismatic,
-                &problem.settings.curves,
-            ),
-            samples,
-        })
+        let prismatic = &problem.declared.prismatic;
+        let curves = curves(&samples, prismatic, &problem.settings.curves);
+        Ok(Self { samples, curves })
     }
 
     /// Root mean square over blocks and joints, with outliers limited to three times the median, in N m (or N).
-    #[allow(clippy::cast_precision_loss)] // few blocks
     pub fn norm(&self) -> f64 {
         let forces = self.samples.iter().flat_map(|sample| &sample.force);
         let squares: Vec<f64> = forces.map(|force| force * force).collect();

@@ -51,22 +51,15 @@ fn residuals(
     windows: &[usize],
     logs: &[Log],
 ) -> Vec<DVector<f64>> {
-    let chosen = windows
-        .iter()
-        .map(|&w| problem.shooting.windows[w])
-        .collect();
-    let noise = &problem.shooting.noise;
-    let shooting =
-        (problem.error_model).shooting(logs, chosen, noise, &problem.smoothing_velocities);
+    let chosen = windows.iter().map(|&w| problem.shooting.windows[w]);
+    let (noise, widths) = (&problem.shooting.noise, &problem.smoothing_velocities);
+    let shooting = (problem.error_model).shooting(logs, chosen.collect(), noise, widths);
     let dynamics = problem.compiled(model);
     let values = Values::of(&dynamics, logs);
     let all = shooting.residuals(&dynamics, &values, &shooting.initial_start_states(0));
     let in_units = |residuals: Vec<f64>| {
-        let units = noise.iter().cycle();
-        DVector::from_iterator(
-            residuals.len(),
-            residuals.iter().zip(units).map(|(r, unit)| r * unit),
-        )
+        let values = residuals.iter().zip(noise.iter().cycle());
+        DVector::from_iterator(residuals.len(), values.map(|(r, unit)| r * unit))
     };
     all.into_iter().map(in_units).collect()
 }

@@ -8,7 +8,6 @@ use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::select::{Folds, Losses, acting, gain, p_value};
-use crate::closeloop::settings::DiagnosticsSettings;
 use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
@@ -93,15 +92,12 @@ pub fn unexplained(
 ) -> Unexplained {
     let omnibus = omnibus(problem, before, after, rng);
     let losses = Losses::by(problem, &Folds::of(problem).alone(), after);
-    let probed: Vec<Probed> = acting(problem, probes)
-        .into_par_iter()
-        .filter_map(|probe| ask(problem, after, probe, &losses))
-        .collect();
-    #[allow(clippy::cast_precision_loss)] // few probes
+    let ask = |probe| ask(problem, after, probe, &losses);
+    let probes = acting(problem, probes).into_par_iter();
+    let probed: Vec<Probed> = probes.filter_map(ask).collect();
     let asked = probed.len().max(1) as f64;
-    let seen = probed
-        .iter()
-        .filter(|p| p.gain > problem.settings.diagnostics.noteworthy_share);
+    let noteworthy = problem.settings.diagnostics.noteworthy_share;
+    let seen = probed.iter().filter(|p| p.gain > noteworthy);
     let least = seen.map(|p| p.p_value).fold(1.0, f64::min);
     let (place, joint) = place(problem, &omnibus, &probed);
     Unexplained {
@@ -134,27 +130,21 @@ fn ask(
 
 /// The variable and the joint of the probe that lowers the loss most; one test among all probes and the omnibus test.
 fn place(problem: &Problem<'_>, omnibus: &Omnibus, probed: &[Probed]) -> (String, Joint) {
-    let DiagnosticsSettings {
-        significance,
-        noteworthy_share,
-        located_share,
-        unlocated_share,
-        ..
-    } = problem.settings.diagnostics;
-    #[allow(clippy::cast_precision_loss)] // few probes
-    let level = 0.5 * significance / probed.len().max(1) as f64;
+    let settings = &problem.settings.diagnostics;
+    let noteworthy = settings.noteworthy_share;
+    let level = 0.5 * settings.significance / probed.len().max(1) as f64;
     let (joint, share) = omnibus.most();
-    let matters = noteworthy_share.max(located_share * share);
+    let matters = noteworthy.max(settings.located_share * share);
     // The residual of low-passed torques near friction reversals is located by the velocity.
     let is_smoothing = |joint: Joint| {
         problem.error_model == ErrorModel::InverseDynamics
-            && omnibus.fractions[joint] <= unlocated_share
+            && omnibus.fractions[joint] <= settings.unlocated_share
     };
     let stands_out = |p: &&Probed| p.p_value < level && p.gain > matters && !is_smoothing(p.joint);
     let most = probed.iter().filter(stands_out);
-    let structured = omnibus.p_value < 0.5 * significance
-        && share > noteworthy_share
-        && omnibus.fraction > unlocated_share;
+    let structured = omnibus.p_value < 0.5 * settings.significance
+        && share > noteworthy
+        && omnibus.fraction > settings.unlocated_share;
     match most.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
         Some(most) => (most.place.clone(), most.joint),
         None if structured => (UNKNOWN.to_owned(), joint),

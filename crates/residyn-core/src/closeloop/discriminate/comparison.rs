@@ -6,89 +6,53 @@ use super::payload::Payload;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::select::Rival;
-use crate::closeloop::settings::{DiscriminateSettings, Settings};
+use crate::closeloop::settings::DiscriminateSettings;
 use crate::data::{Joint, Log};
-use crate::identify::{Fit, Shooting, Solver, Values, fit_by, uncertainty};
+use crate::identify::{Fit, Shooting, Values, fit_by, free_parameters, rms_by_joint, uncertainty};
 use crate::model::{Dynamics, FittedEffect, Model};
 
-/// One of two explanations.
-pub(super) struct Hypothesis {
-    dynamics: Dynamics,
-    /// Scale of the residuals in refits.
-    scale: f64,
+/// An explanation, with the problem's smoothing of friction.
+pub(super) fn explanation(problem: &Problem<'_>, model: &Model) -> Dynamics {
+    problem.smoothed(model).dynamics()
 }
 
-impl Hypothesis {
-    pub fn new(problem: &Problem<'_>, model: &Model) -> Self {
-        Self {
-            dynamics: problem.smoothed(model).dynamics(),
-            scale: problem.settings.discriminate.refit_scale,
-        }
-    }
+/// The rival without effects that have since been withdrawn from the model.
+pub(super) fn rival_explanation(problem: &Problem<'_>, fitted: &Fitted, rival: &Rival) -> Dynamics {
+    let stands = |effect: &&FittedEffect| {
+        let mut known = fitted.model.effects.iter().chain([&rival.effect]);
+        known.any(|other| other.is_same(effect))
+    };
+    let model = &rival.fitted.model;
+    let effects = model.effects.iter().filter(stands).cloned().collect();
+    explanation(problem, &model.with_effects(effects))
+}
 
-    /// The rival without effects that have since been withdrawn from the model.
-    pub fn of_rival(problem: &Problem<'_>, fitted: &Fitted, rival: &Rival) -> Self {
-        let stands = |effect: &&FittedEffect| {
-            let mut known = fitted.model.effects.iter().chain([&rival.effect]);
-            known.any(|other| other.is_same(effect))
-        };
-        let effects: Vec<FittedEffect> = rival
-            .fitted
-            .model
-            .effects
-            .iter()
-            .filter(stands)
-            .cloned()
-            .collect();
-        Self::new(problem, &rival.fitted.model.with_effects(effects))
-    }
+/// The motion that an explanation predicts; `None` if it diverges.
+fn simulate(problem: &Problem<'_>, dynamics: &Dynamics, motions: &[Motion]) -> Option<Record> {
+    let settings = problem.settings;
+    let lengths_s = (settings.fit.window_s, settings.discriminate.pause_s);
+    Record::of(motions, problem.logs, dynamics, lengths_s)
+}
 
-    fn with(&self, payload: Option<&Payload>) -> Self {
-        Self {
-            dynamics: payload.map_or_else(|| self.dynamics.clone(), |p| p.on(&self.dynamics)),
-            scale: self.scale,
-        }
-    }
-
-    /// The motion that the hypothesis predicts; `None` if it diverges.
-    fn simulate(&self, problem: &Problem<'_>, motions: &[Motion]) -> Option<Record> {
-        let Settings {
-            fit, discriminate, ..
-        } = problem.settings;
-        let lengths_s = (fit.window_s, discriminate.pause_s);
-        Record::of(motions, problem.logs, &self.dynamics, lengths_s)
-    }
-
-    /// Fit to a record, with every parameter free that the file does not fix: an experiment may determine parameters
-    /// that the present logs do not.
-    fn refit(
-        &self,
-        solver: &dyn Solver,
-        shooting: &Shooting<'_>,
-        start_states: Vec<Vec<f64>>,
-    ) -> Option<(Values, Fit)> {
-        let parameters = &self.dynamics.parameters;
-        let active: Vec<usize> = (0..parameters.len())
-            .filter(|&k| !parameters[k].fixed)
-            .collect();
-        fit_by(
-            solver,
-            shooting,
-            &self.dynamics,
-            &active,
-            start_states,
-            Some(self.scale),
-        )
-        .ok()
-    }
+/// Fit an explanation to a record, with every parameter free that the file does not fix: an experiment may determine
+/// parameters that the present logs do not.
+fn refit(
+    problem: &Problem<'_>,
+    dynamics: &Dynamics,
+    shooting: &Shooting<'_>,
+    start_states: Vec<Vec<f64>>,
+) -> Option<(Values, Fit)> {
+    let (solver, active) = (problem.solver, free_parameters(dynamics));
+    let scale = Some(problem.settings.discriminate.refit_scale);
+    fit_by(solver, shooting, dynamics, &active, start_states, scale).ok()
 }
 
 /// Two explanations: one is simulated as the truth, and the other is fitted to it.
 pub(super) struct Comparison<'a> {
     problem: &'a Problem<'a>,
-    truth: Hypothesis,
+    truth: Dynamics,
     /// The other explanation, fitted to the present logs as the truth simulates them.
-    other: Hypothesis,
+    other: Dynamics,
     noise: Vec<f64>,
     /// The motion of the present logs as the truth simulates it.
     present: Record,
@@ -122,22 +86,20 @@ impl<'a> Comparison<'a> {
     pub fn new(
         problem: &'a Problem<'a>,
         fitted: &Fitted,
-        truth: Hypothesis,
-        other: Hypothesis,
+        truth: Dynamics,
+        other: Dynamics,
     ) -> Option<Self> {
         let settings = &problem.settings.discriminate;
         let noise = &problem.shooting.noise;
         let noise: Vec<f64> = (noise.iter())
             .map(|noise| (noise * fitted.fit.scale).max(settings.finest_position))
             .collect();
-        let motions: Vec<Motion> = spread(problem.shooting.windows.len(), settings.present_windows)
-            .into_iter()
-            .map(|w| window_of(problem, fitted, w))
-            .collect();
-        let present = truth.simulate(problem, &motions)?;
+        let chosen = spread(problem.shooting.windows.len(), settings.present_windows).into_iter();
+        let motions: Vec<Motion> = chosen.map(|w| window_of(problem, fitted, w)).collect();
+        let present = simulate(problem, &truth, &motions)?;
         let shooting =
             Shooting::new(&present.logs, present.windows.clone(), &noise).with_free_starts();
-        let (values, found) = other.refit(problem.solver, &shooting, present.starts(0..))?;
+        let (values, found) = refit(problem, &other, &shooting, present.starts(0..))?;
         let loss = loss_of(&found);
         let windows = problem.shooting.windows.iter();
         let all_s: f64 = windows.map(|w| w.duration_s(problem.logs)).sum();
@@ -146,10 +108,7 @@ impl<'a> Comparison<'a> {
         let differences = differences(&shooting, &other, &values, &found.start_states, 0);
         Some(Self {
             inflation: inflation(problem, fitted).max(too_sure),
-            other: Hypothesis {
-                dynamics: values.put_into(&other.dynamics, &present.logs),
-                ..other
-            },
+            other: values.put_into(&other, &present.logs),
             start_states: found.start_states,
             differences,
             problem,
@@ -178,13 +137,8 @@ impl<'a> Comparison<'a> {
         let times = self.present.logs.iter().flat_map(|log| &log.time);
         let latest_s = times.fold(0.0_f64, |latest, time| latest.max(time.abs()));
         let declared = self.problem.declared.parameters.len();
-        let truth = &self.truth;
-        Payload::all(
-            &truth.dynamics,
-            declared,
-            self.settings().payload_share,
-            2.0 * latest_s + 10.0,
-        )
+        let (share, delay_s) = (self.settings().payload_share, 2.0 * latest_s + 10.0);
+        Payload::all(&self.truth, declared, share, delay_s)
     }
 
     fn loaded(&self, fitted: &Fitted, payload: &Payload) -> Experiment {
@@ -193,7 +147,7 @@ impl<'a> Comparison<'a> {
             *time += payload.delay_s;
         }
         Experiment {
-            text: payload.text(&self.truth.dynamics),
+            text: payload.text(&self.truth),
             motions,
             turns: None,
         }
@@ -201,16 +155,16 @@ impl<'a> Comparison<'a> {
 
     /// Simulate an experiment; `None` if the rig cannot do it.
     fn test(&self, experiment: &Experiment, payload: Option<&Payload>) -> Option<Trial> {
-        let (truth, other) = (self.truth.with(payload), self.other.with(payload));
-        let proposed = truth
-            .simulate(self.problem, &experiment.motions)
+        let with = |model: &Dynamics| payload.map_or_else(|| model.clone(), |p| p.on(model));
+        let [truth, other] = [&self.truth, &self.other].map(with);
+        let proposed = simulate(self.problem, &truth, &experiment.motions)
             .filter(|record| self.is_possible(record, experiment.turns))?;
         let both = self.present.and(&proposed);
         let shooting =
             Shooting::new(&both.logs, both.windows.clone(), &self.noise).with_free_starts();
         let present = self.start_states.len();
         let start_states = [self.start_states.clone(), both.starts(present..)].concat();
-        let (values, found) = other.refit(self.problem.solver, &shooting, start_states)?;
+        let (values, found) = refit(self.problem, &other, &shooting, start_states)?;
         let duration_s = both.duration_s(present..);
         let rate = (loss_of(&found) - self.loss).max(0.0) / duration_s;
         let differences = differences(&shooting, &other, &values, &found.start_states, present);
@@ -245,13 +199,12 @@ fn window_of(problem: &Problem<'_>, fitted: &Fitted, w: usize) -> Motion {
     let window = problem.shooting.windows[w];
     let log = &problem.logs[window.log];
     let rows = window.first..=window.last;
+    let row = |row: usize| log.tau.iter().map(|tau| tau[row]).collect();
     Motion {
         log: window.log,
         start: fitted.fit.start_states[w].clone(),
         time: log.time[rows.clone()].to_vec(),
-        tau: rows
-            .map(|row| log.tau.iter().map(|tau| tau[row]).collect())
-            .collect(),
+        tau: rows.map(row).collect(),
     }
 }
 
@@ -263,27 +216,15 @@ fn loss_of(fit: &Fit) -> f64 {
 /// Root mean square position difference that a fit leaves on each joint, over the windows from `first` on.
 fn differences(
     shooting: &Shooting<'_>,
-    model: &Hypothesis,
+    model: &Dynamics,
     values: &Values,
     start_states: &[Vec<f64>],
     first: usize,
 ) -> Vec<f64> {
-    let n = model.dynamics.joints;
-    let residuals = shooting.residuals(&model.dynamics, values, start_states);
-    let residuals: Vec<f64> = residuals[first..].concat();
-    let square = |j: usize| {
-        residuals
-            .iter()
-            .skip(j)
-            .step_by(n)
-            .map(|r| r * r)
-            .sum::<f64>()
-    };
-    #[allow(clippy::cast_precision_loss)] // a few thousand rows
-    let rows = (residuals.len() / n).max(1) as f64;
-    (0..n)
-        .map(|j| (square(j) / rows).sqrt() * shooting.noise[j])
-        .collect()
+    let residuals = shooting.residuals(model, values, start_states);
+    let rms = rms_by_joint(&residuals[first..], model.joints);
+    let both = rms.iter().zip(&shooting.noise);
+    both.map(|(rms, noise)| rms * noise).collect()
 }
 
 /// How much more the estimates of a fit scatter than with independent normal residuals of its scale, as a ratio of
@@ -292,7 +233,6 @@ fn inflation(problem: &Problem<'_>, fitted: &Fitted) -> f64 {
     let size = fitted.fit.columns.len();
     let covariance = uncertainty(&problem.shooting, &fitted.fit).covariance;
     let all = fitted.fit.equations();
-    #[allow(clippy::cast_precision_loss)] // few parameters
     let mean = (covariance * all.hessian).trace() / size.max(1) as f64;
     mean.max(1.0)
 }

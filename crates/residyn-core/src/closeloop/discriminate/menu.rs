@@ -1,4 +1,4 @@
-use super::motion::Motion;
+use super::motion::{Motion, is_turn};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::data::{Joint, Quantity, row_after};
@@ -146,10 +146,9 @@ pub(super) fn experiments(
     let of_one_joint = |item: &MenuItem| item.text.contains("{joint}");
     let mut all = Vec::new();
     for item in &MENU {
-        let joints = if of_one_joint(item) {
-            joints
-        } else {
-            &[Joint::at(0)]
+        let joints = match of_one_joint(item) {
+            true => joints,
+            false => &[Joint::at(0)],
         };
         let able = joints
             .iter()
@@ -178,20 +177,17 @@ impl MenuItem {
             Drive::Logged { .. } => problem.top_driving.iter().any(|top| *top > 0.0),
             Drive::Added(_) | Drive::Ramps(_) => problem.top_driving[joint] > 0.0,
         };
-        let coarse = problem
-            .logs
-            .iter()
-            .all(|log| log.median_step() >= problem.settings.discriminate.fastest_sampling_s);
+        let fastest_s = problem.settings.discriminate.fastest_sampling_s;
+        let coarse = (problem.logs.iter()).all(|log| log.median_step() >= fastest_s);
         driven
             && (self.finer == 1 || coarse)
             && !(self.turns && (problem.declared.prismatic[joint] || goes_round(problem, joint)))
     }
 
     fn words(&self, problem: &Problem<'_>, joint: Joint) -> String {
-        let (force, length) = if problem.declared.prismatic[joint] {
-            (" N", "m")
-        } else {
-            (" N m", "rad")
+        let (force, length) = match problem.declared.prismatic[joint] {
+            true => (" N", "m"),
+            false => (" N m", "rad"),
         };
         let (driving, unit) = match problem.declared.driven_by() {
             Quantity::Torque => ("torque", force),
@@ -217,16 +213,15 @@ impl MenuItem {
         let windows = &problem.shooting.windows;
         let first_of_log = |w: &usize| *w == 0 || windows[*w].log != windows[*w - 1].log;
         let starts: Vec<usize> = match self.start {
-            Start::Rest => (0..windows.len())
-                .filter(first_of_log)
-                .take(motions)
-                .collect(),
+            Start::Rest => {
+                let firsts = (0..windows.len()).filter(first_of_log);
+                firsts.take(motions).collect()
+            }
             _ => spread(windows.len(), motions),
         };
-        starts
-            .into_iter()
-            .map(|w| self.motion(problem, w, &fitted.fit.start_states[w], joint))
-            .collect()
+        let states = &fitted.fit.start_states;
+        let motion = |w: usize| self.motion(problem, w, &states[w], joint);
+        starts.into_iter().map(motion).collect()
     }
 
     /// One motion that begins like window `w` of the logs.
@@ -239,8 +234,8 @@ impl MenuItem {
             _ => settings.motion_s,
         };
         let step_s = (log.median_step() / f64::from(self.finer)).max(length_s / settings.most_rows);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand rows
         let rows = (length_s / step_s).round() as usize;
+        let top = problem.top_driving[joint];
         let (begin, end) = (log.time[window.first], log.time[log.rows() - 1]);
         let mut motion = Motion {
             log: window.log,
@@ -249,7 +244,6 @@ impl MenuItem {
             tau: Vec::new(),
         };
         for row in 0..=rows {
-            #[allow(clippy::cast_precision_loss)] // a few thousand rows
             let since = row as f64 * step_s;
             let pace = match self.drive {
                 Drive::Logged { pace, .. } => pace,
@@ -264,11 +258,9 @@ impl MenuItem {
             motion.time.push(begin + since);
             motion.tau.push(match self.drive {
                 Drive::Logged { factor, .. } => logged.map(|tau| factor * tau).collect(),
-                Drive::Added(share) => with(logged, joint, share * problem.top_driving[joint]),
+                Drive::Added(share) => with(logged, joint, share * top),
                 Drive::Ramps(share) => {
-                    let ramp = share
-                        * problem.top_driving[joint]
-                        * triangle(since / settings.ramp_period_s);
+                    let ramp = share * top * triangle(since / settings.ramp_period_s);
                     with(logged.map(|_| 0.0), joint, ramp)
                 }
                 Drive::Nothing => logged.map(|_| 0.0).collect(),
@@ -312,10 +304,8 @@ fn triangle(phase: f64) -> f64 {
 
 /// Whether the logs show full turns of the joint.
 fn goes_round(problem: &Problem<'_>, joint: Joint) -> bool {
-    problem
-        .logs
-        .iter()
-        .any(|log| super::motion::is_turn(&log.q[joint]))
+    let mut logs = problem.logs.iter();
+    logs.any(|log| is_turn(&log.q[joint]))
 }
 
 /// At most `most` evenly spread numbers below `count`.

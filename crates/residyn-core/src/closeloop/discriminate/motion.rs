@@ -20,7 +20,7 @@ pub(super) struct Motion {
 }
 
 /// Simulated logs, each a sequence of motions.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Record {
     pub logs: Vec<Log>,
     /// For each log, the problem's log that its motions begin in, from which per-log values are taken.
@@ -40,12 +40,7 @@ impl Record {
         dynamics: &Dynamics,
         (length_s, pause_s): (f64, f64),
     ) -> Option<Self> {
-        let mut record = Self {
-            logs: Vec::new(),
-            origins: Vec::new(),
-            motions: Vec::new(),
-            windows: Vec::new(),
-        };
+        let mut record = Self::default();
         for motion in motions {
             let index = record.log_of(motion.log, &logs[motion.log]);
             let first = append(&mut record.logs[index], motion, pause_s);
@@ -112,10 +107,8 @@ impl Record {
 
 /// Append the torques of a motion to a log, after a pause, and return the row at which it begins.
 fn append(log: &mut Log, motion: &Motion, pause_s: f64) -> usize {
-    let earliest = log
-        .time
-        .last()
-        .map_or(f64::NEG_INFINITY, |last| last + 2.0 * pause_s);
+    let after_pause = |last: &f64| last + 2.0 * pause_s;
+    let earliest = log.time.last().map_or(f64::NEG_INFINITY, after_pause);
     let delay = (earliest - motion.time[0]).max(0.0);
     let pause = (motion.time[0] - pause_s, &motion.tau[0]);
     let rows = motion.time.iter().copied().zip(&motion.tau);
@@ -136,9 +129,9 @@ fn simulate(log: &mut Log, first: usize, start: &[f64], model: &Dynamics) -> Opt
     simulator.put(start);
     // The row of the pause, which nothing reads, has the start state.
     let columns = log.q.iter_mut().chain(&mut log.qd);
-    columns
-        .zip(start)
-        .for_each(|(column, value)| column.resize(first, *value));
+    for (column, value) in columns.zip(start) {
+        column.resize(first, *value);
+    }
     for row in first..log.rows() {
         if row > first {
             simulator.follow(commands, [row - 1], FIT_S);
@@ -148,9 +141,9 @@ fn simulate(log: &mut Log, first: usize, start: &[f64], model: &Dynamics) -> Opt
         }
         let shown = simulator.shown(commands, [row]).concat();
         let columns = log.q.iter_mut().chain(&mut log.qd);
-        columns
-            .zip(shown)
-            .for_each(|(column, value)| column.push(value[0]));
+        for (column, value) in columns.zip(shown) {
+            column.push(value[0]);
+        }
     }
     Some(())
 }

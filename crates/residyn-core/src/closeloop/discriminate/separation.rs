@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::comparison::{Comparison, Hypothesis, Trial};
+use super::comparison::{Comparison, Trial, explanation, rival_explanation};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::select::Rival;
@@ -42,8 +42,8 @@ pub(super) fn separation(
     rival: &Rival,
 ) -> Option<Separation> {
     let settings = &problem.settings.discriminate;
-    let chosen = Hypothesis::new(problem, &fitted.model);
-    let other = Hypothesis::of_rival(problem, fitted, rival);
+    let chosen = explanation(problem, &fitted.model);
+    let other = rival_explanation(problem, fitted, rival);
     let comparison = if rival.contains_chosen() {
         Comparison::new(problem, fitted, other, chosen)
     } else {

@@ -2,7 +2,7 @@ use rand::Rng;
 
 use crate::closeloop::settings::ScoreSettings;
 use crate::data::statistics::bootstrap;
-use crate::identify::{BLOCK_S, blocks_of_times};
+use crate::identify::{BLOCK_S, blocks_of_times, count};
 use crate::sim::metric::OpenLoop;
 
 /// 95 % interval of the relative reduction of the position error (all joints together) from `before` to `after`, by
@@ -14,11 +14,8 @@ pub fn reduction_interval(
     settings: &ScoreSettings,
     rng: &mut impl Rng,
 ) -> Option<[f64; 2]> {
-    interval(
-        &blocks(before, after, settings.whole_logs_from),
-        settings,
-        rng,
-    )
+    let blocks = blocks(before, after, settings.whole_logs_from);
+    interval(&blocks, settings, rng)
 }
 
 /// The same, from each block's squared errors before and after.
@@ -40,18 +37,14 @@ pub fn interval(
 
 /// Squared errors before and after, summed over each block.
 fn blocks(before: &OpenLoop, after: &OpenLoop, whole_logs: usize) -> Vec<(f64, f64)> {
-    let logs = before
-        .windows
-        .iter()
-        .map(|w| w.log)
-        .max()
-        .map_or(0, |last| last + 1);
+    let logs: Vec<usize> = before.windows.iter().map(|w| w.log).collect();
+    let logs = count(&logs);
     let starts = before.windows.iter().map(|w| {
         let start_s = if logs >= whole_logs { 0.0 } else { w.start_s };
         (w.log, start_s)
     });
     let members = blocks_of_times(starts, BLOCK_S);
-    let mut blocks = vec![(0.0, 0.0); members.last().map_or(0, |last| last + 1)];
+    let mut blocks = vec![(0.0, 0.0); count(&members)];
     for ((b, a), member) in before.windows.iter().zip(&after.windows).zip(members) {
         blocks[member].0 += b.position.iter().sum::<f64>();
         blocks[member].1 += a.position.iter().sum::<f64>();

@@ -40,7 +40,6 @@ impl Contradicted {
             format!("{:.1} % {direction}", 100.0 * (ratio - 1.0).abs())
         } else {
             // Two digits, however small it is.
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 2 and 20
             let digits = (1.0 - ratio.log10().floor()).clamp(2.0, 20.0) as usize;
             format!("{ratio:.digits$} times as large")
         }

@@ -83,34 +83,22 @@ pub(in crate::closeloop) fn findings(
         let less = &standing.without;
         let error = |less: &Fitted| scorer.compared(problem.error_model, less);
         let reduction = |less: &Fitted| 1.0 - with / error(less).max(f64::MIN_POSITIVE);
+        // The signed-rank p-value of the falls of the loss.
+        let losses = |model| Losses::of(problem, model).of_effect(&standing.effect);
+        let p_of_refit = |less| p_of_gains(&losses(less), &losses(chosen));
+        let of_refit = || less.as_ref().map_or(1.0, p_of_refit);
         let (expression, parameters) = described(problem.declared, &refined.after.model, k);
         Finding {
             effect: refined.after.model.effects[k].clone(),
             expression,
             parameters,
-            p_value: p_value(&refined.problem, &refined.after, k)
-                .or_else(|| {
-                    let effect = &standing.effect;
-                    Some(p_of_refit(problem, chosen, less.as_ref().ok()?, effect))
-                })
-                .unwrap_or(1.0),
+            p_value: p_value(&refined.problem, &refined.after, k).unwrap_or_else(of_refit),
             error_reduction: less.as_ref().map(reduction).map_err(Clone::clone),
             status: standing.status,
             reason: standing.reason.clone(),
         }
     };
     added.into_par_iter().zip(standings).map(finding).collect()
-}
-
-/// The signed-rank p-value of a model against the refit without one of its effects.
-fn p_of_refit(
-    problem: &Problem<'_>,
-    chosen: &Fitted,
-    without: &Fitted,
-    effect: &FittedEffect,
-) -> f64 {
-    let losses = |model: &Fitted| Losses::of(problem, model).of_effect(effect);
-    p_of_gains(&losses(without), &losses(chosen))
 }
 
 /// What the k-th effect of a model adds, and the parameters that it is reported with: for a shift, the shifted

@@ -5,10 +5,8 @@ use super::candidate::acting;
 
 /// The smallest baseline set: the friction of every joint, unless the model file has it.
 pub fn baseline_friction(problem: &Problem<'_>) -> Vec<FittedEffect> {
-    baseline_sets(problem)
-        .into_iter()
-        .next()
-        .unwrap_or_default()
+    let mut sets = baseline_sets(problem).into_iter();
+    sets.next().unwrap_or_default()
 }
 
 /// The baseline sets, which most machines have, each on all joints together: if every joint has friction, adding it to

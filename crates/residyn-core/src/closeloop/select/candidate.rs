@@ -1,15 +1,16 @@
+use std::collections::HashSet;
 use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::equations::solve;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::data::Joint;
 use crate::identify::{
-    Column, Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, step_within_bounds,
-    with_unit_diagonal,
+    Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, step_within_bounds, submatrix,
 };
-use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect};
+use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect, Model};
 
 /// Every effect of the library on every joint where it can act and is not yet in the model, and every shift of a
 /// parameter that the file declares fixed.
@@ -23,10 +24,10 @@ pub fn candidates(problem: &Problem<'_>, present: &[FittedEffect]) -> Vec<Fitted
 /// These effects on every joint where each can act and be observed.
 pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
-    for effect in effects
+    let observable = effects
         .iter()
-        .filter(|effect| problem.error_model.shows(effect))
-    {
+        .filter(|effect| problem.error_model.shows(effect));
+    for effect in observable {
         for joint in Joint::all(problem.declared.joints) {
             if is_driven_enough(problem, effect, joint)
                 && !is_identified_by_bodies(problem, effect)
@@ -34,10 +35,8 @@ pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
                 && problem.declared.can_carry(effect, joint).is_ok()
             {
                 let (speed, torque) = (problem.top_speed[joint], problem.top_torque[joint]);
-                all.push(FittedEffect::absent(
-                    &effect.measured_by(speed, torque),
-                    joint,
-                ));
+                let effect = effect.measured_by(speed, torque);
+                all.push(FittedEffect::absent(&effect, joint));
             }
         }
     }
@@ -88,10 +87,9 @@ pub fn best_start(
     if starts.len() < 2 {
         return starts.pop();
     }
-    let start_states = problem.sample.start_states(&fitted.fit.start_states);
     match has_switch(candidate) {
-        true => best_by_switches(problem, fitted, &starts, &start_states),
-        false => best_by_cost(problem, fitted, starts, &start_states),
+        true => best_by_switches(problem, fitted, &starts),
+        false => best_by_cost(problem, fitted, starts),
     }
 }
 
@@ -101,13 +99,8 @@ pub fn screened_cost(
     fitted: &Fitted,
     candidate: &FittedEffect,
 ) -> Option<f64> {
-    linearised_cost(
-        problem,
-        &problem.shooting,
-        fitted,
-        candidate,
-        &fitted.fit.start_states,
-    )
+    let start_states = &fitted.fit.start_states;
+    linearised_cost(problem, &problem.shooting, fitted, candidate, start_states)
 }
 
 /// As [`screened_cost`], over a sample of the windows.
@@ -142,10 +135,8 @@ pub fn beside(problem: &Problem<'_>, fitted: &Fitted, candidate: &FittedEffect) 
         return None;
     }
     let mut beside = fitted.clone();
-    let mut added = beside
-        .model
-        .effects
-        .split_off(problem.declared.effects.len());
+    let declared = problem.declared.effects.len();
+    let mut added = beside.model.effects.split_off(declared);
     added.retain(|present| !candidate.contains(present));
     beside.model.effects.extend(added);
     Some(beside)
@@ -156,22 +147,12 @@ fn best_by_cost(
     problem: &Problem<'_>,
     fitted: &Fitted,
     starts: Vec<FittedEffect>,
-    start_states: &[Vec<f64>],
 ) -> Option<FittedEffect> {
-    let predicted = |start: FittedEffect| {
-        let cost = linearised_cost(
-            problem,
-            &problem.sample.shooting,
-            fitted,
-            &start,
-            start_states,
-        )?;
-        Some((start, cost))
-    };
-    let predicted: Vec<(FittedEffect, f64)> =
-        starts.into_par_iter().filter_map(predicted).collect();
-    let best = predicted.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some(best.0)
+    let predicted = |start| Some((screened_cost_on_sample(problem, fitted, &start)?, start));
+    let predicted = starts.into_par_iter().filter_map(predicted);
+    let predicted: Vec<(f64, FittedEffect)> = predicted.collect();
+    let best = predicted.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(best.1)
 }
 
 /// As above, for a candidate that is absent at every starting point: one linearisation compares all of them, since only
@@ -180,7 +161,6 @@ fn best_by_switches(
     problem: &Problem<'_>,
     fitted: &Fitted,
     starts: &[FittedEffect],
-    start_states: &[Vec<f64>],
 ) -> Option<FittedEffect> {
     let numbered = starts.iter().enumerate().map(|(number, start)| {
         let mut start = start.clone();
@@ -194,22 +174,16 @@ fn best_by_switches(
     let places: Vec<Range<usize>> = (first..model.effects.len())
         .map(|k| model.place_of(k))
         .collect();
-    let parameters = &starts[0].effect.parameters;
-    let is_switch = |k: &usize| parameters[(k - places[0].start) % parameters.len()].is_switch();
+    let switches = switches(&model);
     let mut active = problem.active(&dynamics);
-    active.retain(|k| *k < places[0].start || is_switch(k));
-    let shooting = &problem.sample.shooting;
-    let scale = fitted.fit.scale;
-    let fit = as_it_stands(shooting, &dynamics, &active, start_states.to_vec(), scale).ok()?;
+    active.retain(|k| *k < places[0].start || switches.contains(k));
+    let start_states = problem.sample.start_states(&fitted.fit.start_states);
+    let (shooting, scale) = (&problem.sample.shooting, fitted.fit.scale);
+    let fit = as_it_stands(shooting, &dynamics, &active, start_states, scale).ok()?;
     let all = fit.equations_and_prior();
     let cost = |place: &Range<usize>| {
-        let is_own = |column: &Column| {
-            column.parameter < places[0].start || place.contains(&column.parameter)
-        };
-        let own: Vec<usize> = (0..fit.columns.len())
-            .filter(|&i| is_own(&fit.columns[i]))
-            .collect();
-        least_cost(&dynamics, &fit, &all, &own)
+        let own = fit.columns_of(|k| k < places[0].start || place.contains(&k));
+        least_cost(&dynamics, &fit, &all, own)
     };
     let costs = places.iter().map(cost).zip(starts);
     let best = costs.filter_map(|(cost, start)| Some((cost?, start)));
@@ -218,21 +192,26 @@ fn best_by_switches(
 }
 
 /// The minimum of the quadratic cost over some free values; values at a bound that would leave it are held.
-fn least_cost(dynamics: &Dynamics, fit: &Fit, all: &WindowTerms, own: &[usize]) -> Option<f64> {
-    let solve = |free: &[usize]| {
-        let matrix = all.hessian.select_rows(free).select_columns(free);
-        let (mut scaled, unit) = with_unit_diagonal(&matrix);
-        (0..unit.len()).for_each(|i| scaled[(i, i)] += 1e-9);
-        let right = all.gradient.select_rows(free).component_mul(&unit);
-        Some(-scaled.cholesky()?.solve(&right).component_mul(&unit))
+fn least_cost(dynamics: &Dynamics, fit: &Fit, all: &WindowTerms, own: Vec<usize>) -> Option<f64> {
+    let step = |free: &[usize]| {
+        let matrix = submatrix(&all.hessian, free, free);
+        Some(-solve(&matrix, &all.gradient.select_rows(free))?)
     };
     let leaves = |i: usize, step: f64| {
         let parameter = &dynamics.parameters[fit.columns[i].parameter];
         let [low, high] = parameter.bounds;
         parameter.value <= low && step < 0.0 || parameter.value >= high && step > 0.0
     };
-    let (free, step) = step_within_bounds(own.to_vec(), solve, leaves)?;
+    let (free, step) = step_within_bounds(own, step, leaves)?;
     Some(0.5 * all.gradient.select_rows(&free).dot(&step))
+}
+
+/// The parameters of a model, counted among all, that switch one of its effects off at zero.
+pub fn switches(model: &Model) -> HashSet<usize> {
+    let placed = |k: usize| model.place_of(k).zip(&model.effects[k].effect.parameters);
+    let all = (0..model.effects.len()).flat_map(placed);
+    let switches = all.filter(|(_, parameter)| parameter.is_switch());
+    switches.map(|(k, _)| k).collect()
 }
 
 /// Whether some parameter value switches the effect off, so that it can start from absent.

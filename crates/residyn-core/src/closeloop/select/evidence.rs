@@ -1,10 +1,11 @@
 use nalgebra::DVector;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
+use super::candidate::switches;
 use super::trial::differences;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::identify::{squared_distance, uncertainty};
+use crate::identify::{squared_distance, submatrix, uncertainty};
 
 /// Fall of the loss as a share of the loss before.
 pub fn gain(before: &[f64], after: &[f64]) -> f64 {
@@ -14,36 +15,25 @@ pub fn gain(before: &[f64], after: &[f64]) -> f64 {
 /// Probability, by the cluster-robust Wald test, of the fitted values of the k-th effect if it were absent. `None` for
 /// an effect that no parameter value switches off.
 pub fn p_value(problem: &Problem<'_>, fitted: &Fitted, k: usize) -> Option<f64> {
-    let effect = &fitted.model.effects[k].effect;
-    let range = fitted.model.place_of(k);
-    let is_switch = |parameter: usize| {
-        range.contains(&parameter) && effect.parameters[parameter - range.start].is_switch()
-    };
-    let columns = &fitted.fit.columns;
-    let switches: Vec<usize> = (0..columns.len())
-        .filter(|&i| is_switch(columns[i].parameter))
-        .collect();
+    let own = fitted.model.place_of(k);
+    let all = switches(&fitted.model);
+    let switches = (fitted.fit).columns_of(|k| own.contains(&k) && all.contains(&k));
     if switches.is_empty() {
         return None;
     }
     let uncertainty = uncertainty(&problem.shooting, &fitted.fit);
-    let covariance = uncertainty
-        .covariance
-        .select_rows(&switches)
-        .select_columns(&switches);
-    let values = DVector::from_iterator(
-        switches.len(),
-        switches.iter().map(|&i| {
-            let log = columns[i].log.map(|log| &problem.logs[log]);
-            fitted.model.value_of(columns[i].parameter, log)
-        }),
-    );
+    let covariance = submatrix(&uncertainty.covariance, &switches, &switches);
+    let value = |&i: &usize| {
+        let column = fitted.fit.columns[i];
+        let log = column.log.map(|log| &problem.logs[log]);
+        fitted.model.value_of(column.parameter, log)
+    };
+    let values = DVector::from_iterator(switches.len(), switches.iter().map(value));
     let statistic = squared_distance(&covariance, &values);
     Some(f_test(statistic, switches.len(), uncertainty.blocks))
 }
 
 /// Hotelling's form of the F test: a quadratic form in estimates whose covariance comes from few blocks.
-#[allow(clippy::cast_precision_loss)] // few blocks
 fn f_test(statistic: f64, restrictions: usize, blocks: usize) -> f64 {
     let (q, freedom) = (restrictions as f64, blocks as f64 - restrictions as f64);
     if freedom < 1.0 {
@@ -59,7 +49,6 @@ fn f_test(statistic: f64, restrictions: usize, blocks: usize) -> f64 {
 
 /// One-sided signed-rank test (Wilcoxon 1945) of the fall in loss over blocks, in its normal
 /// approximation: effects that act in a few fast blocks give falls with tails too heavy for a t-test.
-#[allow(clippy::cast_precision_loss)] // few blocks
 pub fn p_of_gains(before: &[f64], after: &[f64]) -> f64 {
     let mut falls = differences(before, after);
     falls.retain(|fall| *fall != 0.0);

@@ -1,7 +1,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::closeloop::problem::Problem;
-use crate::identify::{Fit, WindowTerms, blocks, with_unit_diagonal};
+use crate::identify::{Fit, WindowTerms, blocks, count, with_unit_diagonal};
 
 /// A problem's windows in blocks, for each of which a loss is given, and in groups, which are left out of a fit
 /// together.
@@ -18,8 +18,7 @@ impl Folds {
     pub fn of(problem: &Problem<'_>) -> Self {
         let shooting = &problem.shooting;
         let blocks = blocks(shooting);
-        let count = blocks.last().map_or(0, |last| last + 1);
-        let mut log_of = vec![0; count];
+        let mut log_of = vec![0; count(&blocks)];
         for (window, &block) in shooting.windows.iter().zip(&blocks) {
             log_of[block] = window.log;
         }
@@ -52,34 +51,21 @@ impl Folds {
         self
     }
 
-    /// Number of groups, some of which may be empty.
-    fn count(&self) -> usize {
-        self.groups.iter().max().map_or(0, |last| last + 1)
-    }
-
     /// Normal equations of each block and of each group.
     pub fn equations(&self, fit: &Fit) -> (Vec<WindowTerms>, Vec<WindowTerms>) {
         let blocks = fit.equations_by(&self.blocks);
-        let mut groups = vec![fit.zero_equations(); self.count()];
+        let mut groups = vec![fit.zero_equations(); count(&self.groups)];
         for (part, &group) in blocks.iter().zip(&self.groups) {
-            groups[group].cost += part.cost;
-            groups[group].gradient += &part.gradient;
-            groups[group].hessian += &part.hessian;
+            groups[group] += part;
         }
         (blocks, groups)
     }
 }
 
-/// The loss on each block of a problem's windows, with the parameters that a fit without the block's group would give.
-/// The fit is not repeated: each window's loss is taken as quadratic around the joint optimum, where leaving out a
-/// group moves the parameters by (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps its per-log values, since no
-/// other log determines them.
-pub fn left_out_losses(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
-    losses_by(&Folds::of(problem), fit)
-}
-
-/// As [`left_out_losses`], with given folds.
-pub fn losses_by(folds: &Folds, fit: &Fit) -> Vec<f64> {
+/// The loss on each block, with the parameters that a fit without the block's group would give. The fit is not repeated:
+/// each window's loss is taken as quadratic around the joint optimum, where leaving out a group moves the parameters by
+/// (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps its per-log values, since no other log determines them.
+pub fn left_out_losses(folds: &Folds, fit: &Fit) -> Vec<f64> {
     let steps = steps_without(folds, fit);
     let blocks = fit.equations_by(&folds.blocks);
     let loss = |(part, &group): (&WindowTerms, &usize)| {
@@ -97,10 +83,9 @@ pub fn predicted(
     step: &DVector<f64>,
 ) -> f64 {
     let loss = cost + gradient.dot(step) + 0.5 * step.dot(&(hessian * step));
-    if loss < -cost {
-        f64::INFINITY
-    } else {
-        loss.max(0.0)
+    match loss < -cost {
+        true => f64::INFINITY,
+        false => loss.max(0.0),
     }
 }
 
@@ -110,15 +95,11 @@ pub fn steps_without(folds: &Folds, fit: &Fit) -> Vec<DVector<f64>> {
     let all = fit.equations_and_prior();
     let step = |part: &WindowTerms| {
         // At a bound the gradients do not sum to zero; the bound's part must not move the rest.
-        let own = &part.gradient - &all.gradient * share(&part.hessian, &all.hessian);
+        let share = part.hessian.trace() / all.hessian.trace().max(f64::MIN_POSITIVE);
+        let own = &part.gradient - &all.gradient * share;
         step_without(&all.hessian, &part.hessian, &own, folds.kept_information)
     };
     groups.iter().map(step).collect()
-}
-
-/// The share of the information that one group holds.
-fn share(part: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
-    part.trace() / all.trace().max(f64::MIN_POSITIVE)
 }
 
 /// The step of the free values when a part of the windows, with this gradient at the fit, is left out. Directions on
@@ -139,10 +120,9 @@ pub fn step_without(
             known
         }
     });
-    match rest.cholesky() {
-        Some(factor) => factor
-            .solve(&gradient.component_mul(&unit))
-            .component_mul(&unit),
-        None => DVector::zeros(unit.len()),
-    }
+    let Some(factor) = rest.cholesky() else {
+        return DVector::zeros(unit.len());
+    };
+    let step = factor.solve(&gradient.component_mul(&unit));
+    step.component_mul(&unit)
 }

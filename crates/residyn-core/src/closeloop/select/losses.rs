@@ -1,13 +1,13 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::folds::{Folds, losses_by, steps_without};
+use super::folds::{Folds, left_out_losses, steps_without};
 use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::data::Joint;
 use crate::identify::{Values, Window, huber};
-use crate::model::FittedEffect;
+use crate::model::{Dynamics, FittedEffect};
 
 /// The losses of a model on blocks left out of its fit: `[block * parts + part]`. For motion all joints are one part,
 /// since each moves the others; for torques each joint is a part. The gain of an effect on one of many joints shows on
@@ -28,7 +28,7 @@ impl Losses {
     pub fn by(problem: &Problem<'_>, folds: &Folds, fitted: &Fitted) -> Self {
         let parts = problem.parts();
         let values = match problem.error_model {
-            ErrorModel::OutputError => losses_by(folds, &fitted.fit),
+            ErrorModel::OutputError => left_out_losses(folds, &fitted.fit),
             ErrorModel::InverseDynamics => {
                 of_torques(problem, folds, fitted, |r| huber(r / fitted.fit.scale))
             }
@@ -54,10 +54,8 @@ impl Losses {
     }
 
     fn of_parts(&self, parts: &[usize]) -> Vec<f64> {
-        let blocks = self.values.chunks(self.parts);
-        blocks
-            .map(|of_stretch| parts.iter().map(|part| of_stretch[*part]).sum())
-            .collect()
+        let sum = |of_block: &[f64]| parts.iter().map(|part| of_block[*part]).sum();
+        self.values.chunks(self.parts).map(sum).collect()
     }
 }
 
@@ -69,39 +67,46 @@ pub fn of_torques(
     fitted: &Fitted,
     loss: impl Fn(f64) -> f64 + Sync,
 ) -> Vec<f64> {
-    let (fit, joints) = (&fitted.fit, problem.declared.joints);
-    let dynamics = problem.compiled(&fitted.model);
-    let values = Values::of(&dynamics, problem.logs);
-    let of_group = |(group, step): (usize, &DVector<f64>)| {
-        let values = values.moved(&dynamics, &fit.columns, step);
+    let joints = problem.declared.joints;
+    let of_group = |group: usize, dynamics: &Dynamics, values: &Values| {
         let all = problem.shooting.windows.iter().zip(&folds.blocks);
         let own = all.filter(|(_, block)| folds.groups[**block] == group);
         let (windows, blocks): (Vec<Window>, Vec<usize>) = own.unzip();
         let shooting = problem.shooting.over(windows);
-        let residuals = shooting.residuals(&dynamics, &values, &shooting.initial_start_states(0));
+        let residuals = shooting.residuals(dynamics, values, &shooting.initial_start_states(0));
         let of_window = |(residuals, block): (Vec<f64>, usize)| {
-            let sum = |j: usize| {
-                residuals
-                    .iter()
-                    .skip(j)
-                    .step_by(joints)
-                    .map(|r| loss(*r))
-                    .sum()
+            let of_joint = |j: usize| {
+                let own = residuals.iter().skip(j).step_by(joints);
+                (block * joints + j, own.map(|r| loss(*r)).sum::<f64>())
             };
-            let losses: Vec<f64> = (0..joints).map(sum).collect();
-            (block, losses)
+            (0..joints).map(of_joint).collect::<Vec<_>>()
         };
         let windows = residuals.into_iter().zip(blocks);
-        windows.map(of_window).collect::<Vec<_>>()
+        windows.flat_map(of_window).collect()
     };
-    let steps = steps_without(folds, fit);
+    left_out_sums(problem, folds, fitted, joints, of_group)
+}
+
+/// Sums `[block * parts + part]` of what `of_group` gives for each group of blocks, as place and summand, with the model
+/// and the values that the linearised fit without the group gives.
+pub fn left_out_sums(
+    problem: &Problem<'_>,
+    folds: &Folds,
+    fitted: &Fitted,
+    parts: usize,
+    of_group: impl Fn(usize, &Dynamics, &Values) -> Vec<(usize, f64)> + Sync,
+) -> Vec<f64> {
+    let dynamics = problem.compiled(&fitted.model);
+    let values = Values::of(&dynamics, problem.logs);
+    let of_group = |(group, step): (usize, &DVector<f64>)| {
+        let there = values.moved(&dynamics, &fitted.fit.columns, step);
+        of_group(group, &dynamics, &there)
+    };
+    let steps = steps_without(folds, &fitted.fit);
     let groups: Vec<_> = steps.par_iter().enumerate().map(of_group).collect();
-    let mut sums = vec![0.0; folds.groups.len() * joints];
-    for (block, losses) in groups.into_iter().flatten() {
-        let own = &mut sums[block * joints..][..joints];
-        own.iter_mut()
-            .zip(losses)
-            .for_each(|(sum, loss)| *sum += loss);
+    let mut sums = vec![0.0; folds.groups.len() * parts];
+    for (place, summand) in groups.into_iter().flatten() {
+        sums[place] += summand;
     }
     sums
 }

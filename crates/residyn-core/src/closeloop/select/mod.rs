@@ -2,6 +2,7 @@
 
 mod baseline;
 mod candidate;
+mod equations;
 mod evidence;
 mod exchange;
 mod folds;

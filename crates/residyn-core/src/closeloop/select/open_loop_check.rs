@@ -1,14 +1,12 @@
-use nalgebra::DVector;
-use rayon::prelude::*;
-
-use super::folds::{Folds, steps_without};
-use super::losses::of_torques;
+use super::folds::Folds;
+use super::losses::{left_out_sums, of_torques};
 use super::trial::{Trial, differences};
 use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::settings::SelectSettings;
 use crate::data::statistics::{mean, standard_error};
 use crate::identify::{Values, Window};
+use crate::model::Dynamics;
 use crate::sim::FIT_S;
 use crate::sim::metric::{errors_in, windows};
 
@@ -41,16 +39,10 @@ impl OpenLoopCheck {
 
 /// Squares of the open-loop error in each block, with the values that a fit without the block's group gives.
 fn of_motion(problem: &Problem<'_>, folds: &Folds, trial: &Trial) -> Vec<f64> {
-    let fit = &trial.fitted.fit;
-    let dynamics = problem.compiled(&trial.fitted.model);
-    let values = Values::of(&dynamics, problem.logs);
-    let steps = steps_without(folds, fit);
-    let logs: Vec<Vec<(Window, usize)>> = (0..problem.logs.len())
-        .map(|log| blocks_of(problem, folds, log))
-        .collect();
-    let of_group = |(group, step): (usize, &DVector<f64>)| {
-        let there = values.moved(&dynamics, &fit.columns, step);
-        let model = there.put_into(&dynamics, problem.logs);
+    let blocks = |log| blocks_of(problem, folds, log);
+    let logs: Vec<Vec<(Window, usize)>> = (0..problem.logs.len()).map(blocks).collect();
+    let of_group = |group: usize, dynamics: &Dynamics, values: &Values| {
+        let model = values.put_into(dynamics, problem.logs);
         let of_log = |(log, all): (usize, &Vec<(Window, usize)>)| {
             let own = all.iter().filter(|(_, s)| folds.groups[*s] == group);
             let (own, blocks): (Vec<Window>, Vec<usize>) = own.copied().unzip();
@@ -61,15 +53,9 @@ fn of_motion(problem: &Problem<'_>, folds: &Folds, trial: &Trial) -> Vec<f64> {
             let squares = errors.iter().map(|error| error.position.iter().sum());
             blocks.into_iter().zip(squares).collect()
         };
-        let all: Vec<(usize, f64)> = logs.iter().enumerate().flat_map(of_log).collect();
-        all
+        logs.iter().enumerate().flat_map(of_log).collect()
     };
-    let groups: Vec<_> = steps.par_iter().enumerate().map(of_group).collect();
-    let mut squares = vec![0.0; folds.groups.len()];
-    for (block, square) in groups.into_iter().flatten() {
-        squares[block] += square;
-    }
-    squares
+    left_out_sums(problem, folds, &trial.fitted, 1, of_group)
 }
 
 /// The windows over which the open-loop error of a log is taken, as if it were the only log, and the block in which

@@ -2,7 +2,8 @@ use rayon::prelude::*;
 
 use super::candidate::candidates;
 use super::evidence::gain;
-use super::screening::Screening;
+use super::screening::{Screening, Set};
+use super::sets::ranked;
 use super::trial::{Trial, differences};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
@@ -62,27 +63,20 @@ fn instead_of(
     let settings = &problem.settings.select;
     let declared = problem.declared.effects.len();
     let present = &chosen.fitted.model.effects[declared + k];
-    let others: Vec<usize> = screening
-        .present()
-        .into_iter()
-        .filter(|i| *i != k)
-        .collect();
-    let mut options: Vec<(f64, &FittedEffect)> = (screening.present().len()..screening.items.len())
-        .filter_map(|item| {
-            let set = [others.as_slice(), &[item]].concat();
-            Some((screening.losses(&set)?.iter().sum(), &screening.items[item]))
-        })
-        .collect();
-    options.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut others = screening.present();
+    others.remove(k);
+    let sets = (screening.present().len()..screening.items.len())
+        .map(|item| [others.as_slice(), &[item]].concat());
+    let mut options = ranked(screening, sets.collect());
     options.retain(|(loss, _)| {
         *loss <= settings.prediction_slack * settings.rival_loss * chosen.loss()
     });
     options.truncate(settings.rivals_per_effect);
     let own = |trial: &Trial| trial.losses.of_effect(present);
     let gain = |trial: &Trial| gain(&own(less), &own(trial));
-    let rival = |(_, effect): &(f64, &FittedEffect)| {
+    let rival = |(_, set): (f64, Set)| {
         let mut effects = chosen.fitted.model.effects.clone();
-        effects[declared + k] = (*effect).clone();
+        effects[declared + k] = screening.items[*set.last()?].clone();
         let below = settings.rival_loss * chosen.loss();
         let fitted = problem.with_better_effects(&chosen.fitted, effects, below)?;
         let trial = Trial::of(problem, fitted);
@@ -96,7 +90,7 @@ fn instead_of(
             fitted: trial.fitted,
         })
     };
-    options.iter().filter_map(rival).collect()
+    options.into_iter().filter_map(rival).collect()
 }
 
 /// Whether the left-out losses on an effect's joints do not distinguish a set from the chosen one; `less` has neither

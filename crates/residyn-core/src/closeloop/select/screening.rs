@@ -3,12 +3,13 @@ use std::ops::{AddAssign, Range};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::candidate::{beside, best_start, has_switch, screened_cost_on_sample};
+use super::candidate::{beside, best_start, has_switch, screened_cost_on_sample, switches};
+use super::equations::{distinguishes, solve};
 use super::folds::{Folds, predicted, step_without};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::identify::{Column, Fit, WindowTerms, as_it_stands, with_unit_diagonal};
-use crate::model::{Dynamics, EffectParameter, FittedEffect};
+use crate::identify::{Column, Values, WindowTerms, as_it_stands, submatrix};
+use crate::model::{EffectParameter, FittedEffect};
 
 /// The predicted gain of sets of effects added to a fitted model: its loss as a quadratic function of its parameters
 /// and those of every candidate at once. Sets are compared without a fit, and candidates that help only together are
@@ -51,95 +52,65 @@ struct Minimum {
 impl Screening {
     /// The loss of `fitted` with all candidates; `None` if the model diverges.
     pub fn of(problem: &Problem<'_>, fitted: &Fitted, candidates: &[FittedEffect]) -> Option<Self> {
-        let options: Vec<FittedEffect> = candidates
+        let start = |candidate: &FittedEffect| {
+            let beside = beside(problem, fitted, candidate)?;
+            let mut parameters = candidate.effect.parameters.iter();
+            match parameters.all(EffectParameter::is_switch) {
+                true => Some(candidate.clone()),
+                false => best_start(problem, &beside, candidate),
+            }
+        };
+        let options = candidates
             .par_iter()
-            .filter(|candidate| has_switch(candidate))
-            .filter_map(|candidate| {
-                let beside = beside(problem, fitted, candidate)?;
-                if candidate
-                    .effect
-                    .parameters
-                    .iter()
-                    .all(EffectParameter::is_switch)
-                {
-                    return Some(candidate.clone());
-                }
-                best_start(problem, &beside, candidate)
-            })
-            .collect();
-        let options = together(problem, fitted, options);
+            .filter(|candidate| has_switch(candidate));
+        let options = together(problem, fitted, options.filter_map(start).collect());
         let model = fitted.model.with_effects(fitted.effects_and(&options));
         let dynamics = problem.compiled(&model);
-        let added = problem.declared.effects.len()..model.effects.len();
+        let added = problem.added(&model);
         let places: Vec<Range<usize>> = added.clone().map(|k| model.place_of(k)).collect();
         let present = problem.added(&fitted.model).len();
+        let switches = switches(&model);
         // The values that shape an absent effect change nothing.
         let shapes = |k: &usize| {
-            let item = places.iter().position(|place| place.contains(k));
-            item.is_some_and(|item| {
-                let parameters = &model.effects[added.start + item].effect.parameters;
-                item >= present && !parameters[k - places[item].start].is_switch()
-            })
+            let mut absent = places[present..].iter();
+            absent.any(|place| place.contains(k)) && !switches.contains(k)
         };
         let mut active = problem.active(&dynamics);
         active.retain(|k| !shapes(k));
         let (start_states, scale) = (fitted.fit.start_states.clone(), fitted.fit.scale);
         let fit = as_it_stands(&problem.shooting, &dynamics, &active, start_states, scale).ok()?;
-        let items = model.effects[added].to_vec();
-        Some(Self::from_fit(
-            problem, &dynamics, &fit, items, &places, present,
-        ))
-    }
-
-    fn from_fit(
-        problem: &Problem<'_>,
-        dynamics: &Dynamics,
-        fit: &Fit,
-        items: Vec<FittedEffect>,
-        places: &[Range<usize>],
-        present: usize,
-    ) -> Self {
-        let values = crate::identify::Values::of(dynamics, problem.logs);
-        let of_item = |place: &Range<usize>| -> Vec<usize> {
-            let columns = fit.columns.iter().enumerate();
-            let own = columns.filter(|(_, column)| place.contains(&column.parameter));
-            own.map(|(i, _)| i).collect()
-        };
-        let columns_of: Vec<Vec<usize>> = places.iter().map(of_item).collect();
-        let is_base = |i: &usize| !columns_of.iter().any(|of| of.contains(i));
+        let values = Values::of(&dynamics, problem.logs);
         let room = |column: &Column| {
             let [low, high] = dynamics.parameters[column.parameter].bounds;
             let at = values.get(*column);
             [(low - at).min(0.0), (high - at).max(0.0)]
         };
-        let to_zero = |column: &Column| {
-            let place = places.iter().zip(&items);
-            let mut of = place.filter(|(place, _)| place.contains(&column.parameter));
-            let is_switch = of.next().is_some_and(|(place, item)| {
-                item.effect.parameters[column.parameter - place.start].is_switch()
-            });
-            if is_switch { -values.get(*column) } else { 0.0 }
+        let to_zero = |column: &Column| match switches.contains(&column.parameter) {
+            true => -values.get(*column),
+            false => 0.0,
         };
+        let is_base = |k: usize| !places.iter().any(|place| place.contains(&k));
         let folds = Folds::of(problem);
-        let (blocks, groups) = folds.equations(fit);
-        let base: Vec<usize> = (0..fit.columns.len()).filter(is_base).collect();
-        let message = |i: &&usize| problem.is_identifiable(fit.columns[**i].parameter);
-        Self {
-            message: base.iter().filter(message).copied().collect(),
-            base,
+        let (blocks, groups) = folds.equations(&fit);
+        let settings = &problem.settings.select;
+        Some(Self {
+            items: model.effects[added].to_vec(),
+            present,
+            columns_of: (places.iter())
+                .map(|place| fit.columns_of(|k| place.contains(&k)))
+                .collect(),
+            base: fit.columns_of(is_base),
+            message: fit.columns_of(|k| is_base(k) && problem.is_identifiable(k)),
             room: fit.columns.iter().map(room).collect(),
             to_zero: fit.columns.iter().map(to_zero).collect(),
             groups_of: folds.groups,
-            all: fit.equations_and_prior(),
-            information: fit.equations().hessian,
-            own_information: problem.settings.select.own_information,
-            kept_information: problem.settings.select.kept_information,
-            items,
-            present,
-            columns_of,
             blocks,
             groups,
-        }
+            all: fit.equations_and_prior(),
+            information: fit.equations().hessian,
+            own_information: settings.own_information,
+            kept_information: settings.kept_information,
+        })
     }
 
     /// The items that the model has.
@@ -152,22 +123,19 @@ impl Screening {
         set.iter().map(|&item| self.items[item].clone()).collect()
     }
 
-    /// Predicted loss of a set on each block, with the parameters that a fit without the block's group would give.
-    pub fn losses(&self, set: &[usize]) -> Option<Vec<f64>> {
+    /// Predicted loss of a set, each block with the parameters that a fit without the block's group would give; `None`
+    /// if the logs do not distinguish its values.
+    pub fn loss(&self, set: &[usize]) -> Option<f64> {
         let minimum = self.minimum(set)?;
         let (free, moved) = (&minimum.free, &minimum.moved);
         let rows: Vec<usize> = [free.as_slice(), moved].concat();
         let at = self.step(&minimum)?.select_rows(&rows);
-        let all = sub(&self.all.hessian, free, free);
+        let all = submatrix(&self.all.hessian, free, free);
         let without = |group: &WindowTerms| {
+            let own = submatrix(&group.hessian, free, free);
             let gradient =
-                group.gradient.select_rows(free) + sub(&group.hessian, free, &rows) * &at;
-            let step = step_without(
-                &all,
-                &sub(&group.hessian, free, free),
-                &gradient,
-                self.kept_information,
-            );
+                group.gradient.select_rows(free) + submatrix(&group.hessian, free, &rows) * &at;
+            let step = step_without(&all, &own, &gradient, self.kept_information);
             let mut there = at.clone();
             there.rows_mut(0, free.len()).add_assign(&step);
             there
@@ -176,10 +144,10 @@ impl Screening {
         let loss = |(part, &group): (&WindowTerms, &usize)| {
             let step = &steps[group];
             let gradient = part.gradient.select_rows(&rows);
-            let hessian = sub(&part.hessian, &rows, &rows);
+            let hessian = submatrix(&part.hessian, &rows, &rows);
             predicted(part.cost, &gradient, &hessian, step)
         };
-        Some(self.blocks.iter().zip(&self.groups_of).map(loss).collect())
+        Some(self.blocks.iter().zip(&self.groups_of).map(loss).sum())
     }
 
     /// Which values of a set are free at the minimum of the loss, and the values of the others.
@@ -199,7 +167,7 @@ impl Screening {
         }
         let mut minimum = Minimum { free, held, moved };
         let message = [&self.message, &minimum.free[self.base.len()..]].concat();
-        let information = sub(&self.information, &message, &message);
+        let information = submatrix(&self.information, &message, &message);
         if !distinguishes(&information, self.message.len(), self.own_information) {
             return None;
         }
@@ -209,11 +177,8 @@ impl Screening {
                 let [low, high] = self.room[i];
                 (step[i] - step[i].clamp(low, high)).abs() / step[i].abs().max(f64::MIN_POSITIVE)
             };
-            let worst = minimum
-                .free
-                .iter()
-                .copied()
-                .max_by(|a, b| beyond(a).total_cmp(&beyond(b)));
+            let free = minimum.free.iter().copied();
+            let worst = free.max_by(|a, b| beyond(a).total_cmp(&beyond(b)));
             match worst.filter(|i| beyond(i) > 1e-9) {
                 None => return Some(minimum),
                 Some(i) => {
@@ -228,8 +193,8 @@ impl Screening {
     /// The displacement of all values at the minimum of the loss.
     fn step(&self, minimum: &Minimum) -> Option<DVector<f64>> {
         let Minimum { free, held, moved } = minimum;
-        let matrix = sub(&self.all.hessian, free, free);
-        let displaced = sub(&self.all.hessian, free, moved) * held.select_rows(moved);
+        let matrix = submatrix(&self.all.hessian, free, free);
+        let displaced = submatrix(&self.all.hessian, free, moved) * held.select_rows(moved);
         let solution = solve(&matrix, &(self.all.gradient.select_rows(free) + displaced))?;
         let mut step = held.clone();
         for (&i, value) in free.iter().zip(solution.iter()) {
@@ -248,18 +213,13 @@ fn together(
 ) -> Vec<FittedEffect> {
     // Each window's equations with and without its own free values, and those of the blocks.
     let equations = 3 * problem.shooting.windows.len().max(1);
-    #[allow(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss
-    )] // at most the square root of 2^28
     let values = (problem.settings.select.most_numbers as f64 / equations as f64).sqrt() as usize;
     let room = values.saturating_sub(fitted.fit.columns.len());
-    let switches = |option: &FittedEffect| {
+    let size = |option: &FittedEffect| {
         let parameters = option.effect.parameters.iter();
         parameters.filter(|parameter| parameter.is_switch()).count()
     };
-    if options.iter().map(switches).sum::<usize>() <= room {
+    if options.iter().map(size).sum::<usize>() <= room {
         return options;
     }
     let predicted = options.par_iter().enumerate();
@@ -268,42 +228,10 @@ fn together(
     let mut predicted: Vec<(f64, usize)> = predicted.collect();
     predicted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let fits = predicted.iter().scan(0, |sum, (_, k)| {
-        *sum += switches(&options[*k]);
+        *sum += size(&options[*k]);
         (*sum <= room).then_some(*k)
     });
     let mut kept: Vec<usize> = fits.collect();
     kept.sort_unstable();
     kept.into_iter().map(|k| options[k].clone()).collect()
-}
-
-/// Whether the logs distinguish the values after the first `base` from each other and from those: the share of the
-/// information on each that is left when the values before it are free must exceed `least`.
-pub fn distinguishes(matrix: &DMatrix<f64>, base: usize, least: f64) -> bool {
-    let (mut scaled, _) = with_unit_diagonal(matrix);
-    for i in 0..scaled.nrows() {
-        scaled[(i, i)] += RIDGE;
-    }
-    let Some(factor) = scaled.cholesky() else {
-        return false;
-    };
-    let own = factor.l_dirty().diagonal();
-    own.iter().skip(base).all(|own| own.powi(2) > least)
-}
-
-fn sub(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
-    DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
-        matrix[(rows[i], columns[j])]
-    })
-}
-
-/// Smallest information on a direction, in units in which each value alone has 1: redundant items share it.
-const RIDGE: f64 = 1e-9;
-
-fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let (mut scaled, unit) = with_unit_diagonal(matrix);
-    for i in 0..unit.len() {
-        scaled[(i, i)] += RIDGE;
-    }
-    let solution = scaled.cholesky()?.solve(&right.component_mul(&unit));
-    Some(solution.component_mul(&unit))
 }

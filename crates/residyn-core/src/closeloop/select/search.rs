@@ -247,13 +247,8 @@ impl<'a> Search<'a> {
     /// The declared model with each set of effects in place of a trial's, the most promising first, fitted at the
     /// trial's scale to find the best one: sets that cannot be better than the trial or the first few are left out.
     fn fitted_for_the_best(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
-        let first = self
-            .problem
-            .settings
-            .select
-            .fitted_to_the_end
-            .min(sets.len());
-        let rest = sets.split_off(first);
+        let settings = &self.problem.settings.select;
+        let rest = sets.split_off(settings.fitted_to_the_end.min(sets.len()));
         let mut trials = self.fitted(from, sets, from.loss());
         let below = trials.iter().map(Trial::loss).fold(from.loss(), f64::min);
         trials.extend(self.fitted(from, rest, below));
@@ -268,9 +263,8 @@ impl<'a> Search<'a> {
         sets.iter_mut().for_each(without_contained);
         let most = (problem.settings.select).most_effects_of(problem.declared.joints);
         sets.retain(|set| set.len() <= most);
-        first_of_each(&mut sets, vec![from.added_key(problem)], |set| {
-            problem.key(set)
-        });
+        let key = |set: &Vec<FittedEffect>| problem.key(set);
+        first_of_each(&mut sets, vec![from.added_key(problem)], key);
         let trial = |set: Vec<FittedEffect>| {
             let found = self.fitted_from(from, &set, below)?;
             if found.is_valid(problem) {
@@ -312,10 +306,9 @@ impl<'a> Search<'a> {
     /// Record a round, and return its trials, the best first.
     fn noted(&mut self, from: &Trial, mut trials: Vec<Trial>, candidates: usize) -> Vec<Trial> {
         trials.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
-        let gain = |trial: &Trial| 1.0 - trial.loss() / from.loss().max(f64::MIN_POSITIVE);
         let tried = |trial: &Trial| Tried {
             effects: trial.added(self.problem).to_vec(),
-            gain: gain(trial),
+            gain: 1.0 - trial.loss() / from.loss().max(f64::MIN_POSITIVE),
             chosen: false,
         };
         let tried = trials.iter().map(tried).collect();
@@ -331,31 +324,21 @@ impl<'a> Search<'a> {
         let mut current = self.least(best, best);
         loop {
             let added = problem.added(&current.fitted.model);
-            let sets = simpler(
-                problem.effects(),
-                &current.fitted.model.effects,
-                added.clone(),
-            );
-            let mut sets: Vec<_> = sets
-                .into_iter()
-                .map(|set| set[declared..].to_vec())
-                .collect();
+            let effects = &current.fitted.model.effects;
+            let simpler = simpler(problem.effects(), effects, added.clone()).into_iter();
+            let mut sets: Vec<_> = simpler.map(|set| set[declared..].to_vec()).collect();
             let exchanges = exchanges(problem, &current.fitted);
             sets.extend(exchanges.into_iter().map(|exchange| exchange.set));
-            sets.extend(added.clone().map(|k| {
-                let mut less = current.fitted.model.effects[declared..].to_vec();
-                less.remove(k - declared);
-                less
-            }));
+            let without = |k: usize| [&effects[declared..k], &effects[k + 1..]].concat();
+            sets.extend(added.map(without));
             let good = self.as_good_as(best, &current, sets);
             let is_simpler = |trial: &Trial| trial.values() < current.values();
             let (mut good, mut other): (Vec<_>, Vec<_>) = good.into_iter().partition(is_simpler);
             if good.is_empty() {
                 // An exchange may make other effects redundant.
                 other.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
-                let few = other
-                    .iter()
-                    .take(problem.settings.select.simplified_exchanges);
+                let few = problem.settings.select.simplified_exchanges;
+                let few = other.iter().take(few);
                 good = few.map(|trial| self.least(trial, best)).collect();
                 good.retain(is_simpler);
             }
@@ -379,9 +362,8 @@ impl<'a> Search<'a> {
         };
         let settings = &problem.settings.select;
         let within = |set: &Vec<usize>| {
-            let losses = screening.losses(set);
-            let sum = losses.map_or(f64::INFINITY, |losses| losses.iter().sum());
-            sum <= best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
+            let loss = screening.loss(set).unwrap_or(f64::INFINITY);
+            loss <= best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
         };
         let all = screening.present();
         let mut unshifted = all.clone();
@@ -392,9 +374,8 @@ impl<'a> Search<'a> {
         let sets = sets.iter().map(|set| screening.effects(set)).collect();
         let good = self.as_good_as(best, trial, sets);
         let size = |trial: &Trial| (trial.fitted.model.effects.len(), trial.shifts());
-        good.into_iter()
-            .min_by_key(size)
-            .unwrap_or_else(|| trial.clone())
+        let least = good.into_iter().min_by_key(size);
+        least.unwrap_or_else(|| trial.clone())
     }
 
     /// The sets that explain the logs as well as the best one, fitted from a trial.

@@ -12,35 +12,28 @@ pub fn best_predicted(screening: &Screening, problem: &Problem<'_>) -> Vec<Set> 
     let most = settings.most_effects_of(problem.declared.joints);
     let step = problem.of_whole(settings.round_gain);
     let start = screening.present();
-    let total = |set: &Set| Some(screening.losses(set)?.iter().sum::<f64>());
-    let Some(first) = total(&start) else {
+    let Some(first) = screening.loss(&start) else {
         return Vec::new();
     };
     let mut seen: HashSet<Set> = HashSet::from([start.clone()]);
-    let mut ranked: Vec<(f64, Set)> = vec![(first, start.clone())];
+    let mut found: Vec<(f64, Set)> = vec![(first, start.clone())];
     let mut beam = vec![start];
     let mut best = first;
     for _ in 0..settings.beam_steps {
-        let mut next: Vec<Set> = beam
-            .iter()
-            .flat_map(|set| neighbours(screening, set, most))
-            .collect();
+        let next = beam.iter().flat_map(|set| neighbours(screening, set, most));
+        let mut next: Vec<Set> = next.collect();
         next.retain(|set| seen.insert(set.clone()));
-        let mut scored: Vec<(f64, Set)> = next
-            .into_par_iter()
-            .filter_map(|set| Some((total(&set)?, set)))
-            .collect();
-        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut scored = ranked(screening, next);
         scored.truncate(settings.beam_width);
         beam = scored.iter().map(|(_, set)| set.clone()).collect();
         let lowest = scored.first().map_or(f64::INFINITY, |(loss, _)| *loss);
-        ranked.extend(scored);
+        found.extend(scored);
         if lowest > best * (1.0 - step) {
             break;
         }
         best = best.min(lowest);
     }
-    shortlist(ranked, settings.fitted_sets)
+    shortlist(found, settings.fitted_sets)
 }
 
 /// Sets with one item more or less; an added item replaces those that it contains.
@@ -69,25 +62,21 @@ fn neighbours(screening: &Screening, set: &Set, most: usize) -> Vec<Set> {
 /// Sets with ever fewer of some items: each drops from the one before the item that leaves the lowest predicted loss on
 /// left-out blocks.
 pub fn descent(screening: &Screening, from: Set) -> Vec<Set> {
-    let mut sets = Vec::new();
-    let mut current = from;
-    while !current.is_empty() {
-        let without = |k: usize| {
-            let mut less = current.clone();
-            less.remove(k);
-            Some((screening.losses(&less)?.iter().sum::<f64>(), less))
-        };
-        let less: Vec<(f64, Set)> = (0..current.len())
-            .into_par_iter()
-            .filter_map(without)
-            .collect();
-        let Some((_, less)) = less.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else {
-            break;
-        };
-        sets.push(less.clone());
-        current = less;
-    }
-    sets
+    let less = |set: &Set| {
+        let without = |k: usize| [&set[..k], &set[k + 1..]].concat();
+        let less = (0..set.len()).map(without).collect();
+        Some(ranked(screening, less).into_iter().next()?.1)
+    };
+    std::iter::successors(less(&from), less).collect()
+}
+
+/// Sets with their predicted losses, the lowest first; those whose values the logs do not distinguish are left out.
+pub fn ranked(screening: &Screening, sets: Vec<Set>) -> Vec<(f64, Set)> {
+    let scored = sets.into_par_iter();
+    let scored = scored.filter_map(|set| Some((screening.loss(&set)?, set)));
+    let mut scored: Vec<(f64, Set)> = scored.collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+    scored
 }
 
 /// The best set of each size, then the best of the rest.

@@ -46,11 +46,8 @@ pub(super) fn repaired(
             return vec![effect.clone()];
         }
         let richest = parts_of(library, &effect.effect).pop().unwrap_or_default();
-        richest
-            .into_iter()
-            .map(|part| part_of(effect, part))
-            .filter(|part| is_free_of(part, &present))
-            .collect()
+        let parts = richest.into_iter().map(|part| part_of(effect, part));
+        parts.filter(|part| is_free_of(part, &present)).collect()
     };
     effects.iter().flat_map(mend).collect()
 }
@@ -60,10 +57,8 @@ fn parts_of<'l>(library: &'l [Effect], whole: &Effect) -> Vec<Vec<&'l Effect>> {
     let is_part = |effect: &&Effect| whole.contains.contains(&effect.name);
     let parts: Vec<&Effect> = library.iter().filter(is_part).collect();
     let chosen = |set: usize| -> Vec<&Effect> {
-        let members = parts
-            .iter()
-            .enumerate()
-            .filter(|(bit, _)| set >> bit & 1 == 1);
+        let members = parts.iter().enumerate();
+        let members = members.filter(|(bit, _)| set >> bit & 1 == 1);
         members.map(|(_, effect)| *effect).collect()
     };
     let parameters =

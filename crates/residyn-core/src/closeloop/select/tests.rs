@@ -9,16 +9,14 @@ use super::folds::{Folds, left_out_losses, predicted};
 use super::screening::Screening;
 use super::simpler::{repaired, simpler};
 use super::trial::Trial;
-use crate::closeloop::fit::{Declared, NOTHING};
-use crate::closeloop::problem::Problem;
-use crate::closeloop::settings::Settings;
-use crate::closeloop::tests::{absent, logs, pendulum, recorded};
+use crate::closeloop::fit::Declared;
+use crate::closeloop::tests::{Study, absent, pendulum};
 use crate::model::{FittedEffect, Library};
 
 #[test]
 fn what_is_left_out_together_is_a_connected_part_of_one_log() {
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let problem = Problem::new(&declared, &NOTHING, &logs, &settings);
+    let study = Study::of_friction();
+    let problem = study.closed();
     let folds = Folds::of(&problem);
     assert!(folds.groups.is_sorted(), "{:?}", folds.groups);
     let mut logs_of = std::collections::HashMap::new();
@@ -26,7 +24,7 @@ fn what_is_left_out_together_is_a_connected_part_of_one_log() {
         let log = logs_of.entry(folds.groups[block]).or_insert(window.log);
         assert_eq!(*log, window.log);
     }
-    assert!(logs_of.len() >= settings.select.fewest_groups);
+    assert!(logs_of.len() >= study.settings.select.fewest_groups);
 }
 
 #[test]
@@ -42,39 +40,34 @@ fn a_loss_far_below_zero_is_rounding_and_no_loss() {
 
 #[test]
 fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let library = Library::built_in();
-    let problem = Problem::new(&declared, &library, &logs, &settings);
-    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let study = Study::of_friction();
+    let Declared { problem, fitted } = study.fitted();
     let all = candidates(&problem, &[]);
     let screening = Screening::of(&problem, &fitted, &all).unwrap();
-    let loss = |set: &[usize]| screening.losses(set).unwrap().iter().sum::<f64>();
-    let known: f64 = left_out_losses(&problem, &fitted.fit).iter().sum();
+    let loss = |set: &[usize]| screening.loss(set).unwrap();
+    let known: f64 = left_out_losses(&Folds::of(&problem), &fitted.fit)
+        .iter()
+        .sum();
     assert!((loss(&[]) / known - 1.0).abs() < 0.01);
 
-    let items = screening.items.iter().map(FittedEffect::label);
-    let coulomb = items
-        .clone()
-        .position(|label| label.starts_with("coulomb"))
-        .unwrap();
+    let mut items = screening.items.iter().map(FittedEffect::label);
+    let coulomb = items.position(|label| label.starts_with("coulomb"));
+    let coulomb = coulomb.unwrap();
     let effects = screening.effects(&[coulomb]);
     let with = problem.with_effects(&fitted, effects).unwrap();
-    let found: f64 = left_out_losses(&problem, &with.fit).iter().sum();
+    let found: f64 = left_out_losses(&Folds::of(&problem), &with.fit)
+        .iter()
+        .sum();
     assert!(found < 0.2 * known);
-    assert!(
-        loss(&[coulomb]) < 0.3 * known,
-        "{} {found} {known}",
-        loss(&[coulomb])
-    );
+    let promised = loss(&[coulomb]);
+    assert!(promised < 0.3 * known, "{promised} {found} {known}");
 }
 
 /// An encoder disc whose eccentricity is at its bound was not found there.
 #[test]
 fn a_set_with_a_value_at_its_bound_is_not_valid() {
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let library = Library::built_in();
-    let problem = Problem::new(&declared, &library, &logs, &settings);
-    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let study = Study::of_friction();
+    let Declared { problem, fitted } = study.fitted();
     let effects = vec![absent("coulomb_friction"), absent("encoder_eccentricity")];
     let fitted = problem.with_effects(&fitted, effects).unwrap();
     let mut trial = Trial::of(&problem, fitted);
@@ -98,13 +91,13 @@ fn what_most_machines_have_is_said_by_effect_files() {
         .with_effect(drag("bearing", "baseline = 3"))
         .with_effect(drag("grease", "baseline = 1"))
         .with_effect(drag("magnet", ""));
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let problem = Problem::new(&declared, &library, &logs, &settings);
-    let names = |set: &Vec<FittedEffect>| -> Vec<String> {
-        set.iter()
-            .map(|effect| effect.effect.name.clone())
-            .collect()
+    let study = Study {
+        library,
+        ..Study::of_friction()
     };
+    let problem = study.problem();
+    let name = |effect: &FittedEffect| effect.effect.name.clone();
+    let names = |set: &Vec<FittedEffect>| -> Vec<String> { set.iter().map(name).collect() };
     let sets: Vec<_> = baseline_sets(&problem).iter().map(names).collect();
     assert_eq!(sets, [vec!["grease"], vec!["bearing", "grease"]]);
     assert_eq!(names(&baseline_friction(&problem)), ["grease"]);
@@ -120,20 +113,16 @@ fn an_effect_at_a_bound_gives_way_to_what_it_contains() {
     let set = [absent("joint_spring"), stribeck];
     let mended = repaired(library.effects(), &[], &set);
     let labels: Vec<String> = mended.iter().map(FittedEffect::label).collect();
-    assert_eq!(
-        labels,
-        ["joint_spring on joint 1", "coulomb_friction on joint 1"]
-    );
+    let wanted = ["joint_spring on joint 1", "coulomb_friction on joint 1"];
+    assert_eq!(labels, wanted);
     assert_eq!(mended[1].values[0].0, 0.1);
 }
 
 /// With a free inertia, a torque gain can have any value.
 #[test]
 fn a_set_whose_values_the_logs_do_not_tell_apart_is_not_valid() {
-    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let library = Library::built_in();
-    let problem = Problem::new(&declared, &library, &logs, &settings);
-    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let study = Study::of_friction();
+    let Declared { problem, fitted } = study.fitted();
     let is_valid = |names: &[&str]| {
         let effects = names.iter().map(|name| absent(name)).collect();
         let fitted = problem.with_effects(&fitted, effects).unwrap();
@@ -189,10 +178,8 @@ effect = [
     { name = "cogging_torque", joint = 1, A = 0.3, N = 7, phase = 0.4 },
 ]
 "#;
-    let (declared, logs, settings) = (pendulum(), recorded(RIG, 0), Settings::default());
-    let library = Library::built_in();
-    let problem = Problem::new(&declared, &library, &logs, &settings);
-    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let study = Study::of(pendulum(), RIG);
+    let Declared { problem, fitted } = study.fitted();
     let mut ripple = absent("cogging_torque");
     ripple.values = vec![(0.1, None), (6.0, None), (0.4, None)];
     let set = vec![absent("actuator_delay"), ripple];

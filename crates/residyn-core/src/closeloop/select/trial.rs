@@ -1,12 +1,13 @@
+use super::equations::distinguishes;
 use super::evidence::gain;
 use super::identity::EffectId;
 use super::losses::Losses;
-use super::screening::distinguishes;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::settings::SelectSettings;
 use crate::data::Joint;
 use crate::data::statistics::{mean, standard_error};
+use crate::identify::submatrix;
 use crate::model::{EffectParameter, FittedEffect};
 
 /// A model with a set of effects, fitted and judged on blocks left out of the fit.
@@ -62,17 +63,11 @@ impl Trial {
             return true;
         }
         let first = model.place_of(added.start).start;
-        let columns = &fit.columns;
-        let message = |&i: &usize| problem.is_identifiable(columns[i].parameter);
-        let message: Vec<usize> = (0..columns.len()).filter(message).collect();
-        let base = message.iter().filter(|&&i| columns[i].parameter < first);
-        let information = fit.equations().hessian;
-        let information = information.select_rows(&message).select_columns(&message);
-        distinguishes(
-            &information,
-            base.count(),
-            problem.settings.select.own_information,
-        )
+        let message = fit.columns_of(|k| problem.is_identifiable(k));
+        let is_base = |i: &&usize| fit.columns[**i].parameter < first;
+        let base = message.iter().filter(is_base).count();
+        let information = submatrix(&fit.equations().hessian, &message, &message);
+        distinguishes(&information, base, problem.settings.select.own_information)
     }
 
     /// Whether the values of each added effect are consistent with each other and none is at a bound.

@@ -32,21 +32,20 @@ impl Additive {
         let rows = forces.len();
         let mut design = DMatrix::from_element(rows, 1 + SPLINES * bases.len(), 1.0);
         for (k, basis) in bases.iter().enumerate() {
-            design
-                .columns_mut(1 + SPLINES * k, SPLINES)
-                .copy_from(&basis.columns);
+            let mut own = design.columns_mut(1 + SPLINES * k, SPLINES);
+            own.copy_from(&basis.columns);
         }
         let even = DVector::from_element(rows, 1.0);
         let first = Sums::by_block(&design, forces, &even, blocks);
         let penalties = smoothness(&first, bases.len(), rows, settings)?;
-        let rough = solve(&Sums::total(&first), &penalties)?.solve(&Sums::total(&first).right);
+        let total = Sums::total(&first);
+        let rough = solve(&total, &penalties)?.solve(&total.right);
         let weights = weights(&(forces - &design * rough), settings.huber_scales);
         let parts = Sums::by_block(&design, forces, &weights, blocks);
         let penalties = smoothness(&parts, bases.len(), rows, settings)?;
         let total = Sums::total(&parts);
         let coefficients = solve(&total, &penalties)?.solve(&total.right);
         let covariance = jackknife(&total, &parts, &penalties, &coefficients)?;
-        #[allow(clippy::cast_precision_loss)] // few blocks
         let freedom = parts.len() as f64 - 1.0;
         let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
         Some(Self {
@@ -77,14 +76,11 @@ impl Sums {
         weights: &DVector<f64>,
         blocks: &[usize],
     ) -> Vec<Self> {
-        let count = blocks.last().map_or(0, |last| last + 1);
-        let rows_of = |block: usize| {
-            let first = blocks.partition_point(|b| *b < block);
-            (first, blocks.partition_point(|b| *b <= block) - first)
-        };
-        (0..count)
+        let mut next = 0;
+        (blocks.chunk_by(|a, b| a == b))
             .map(|block| {
-                let (first, rows) = rows_of(block);
+                let (first, rows) = (next, block.len());
+                next += rows;
                 let x = design.rows(first, rows);
                 let y = forces.rows(first, rows);
                 let w = DMatrix::from_diagonal(&weights.rows(first, rows).into_owned());
@@ -130,34 +126,24 @@ fn smoothness(
     rows: usize,
     settings: &CurveSettings,
 ) -> Option<DMatrix<f64>> {
-    let CurveSettings {
-        folds,
-        penalty_exponents: penalties,
-        rounds,
-        ..
-    } = settings;
-    let left_out: Vec<Sums> = (0..parts.len().min(*folds))
-        .map(|fold| {
-            let members: Vec<Sums> = parts.iter().skip(fold).step_by(*folds).cloned().collect();
-            Sums::total(&members)
-        })
-        .collect();
+    let (folds, penalties) = (settings.folds, &settings.penalty_exponents);
+    let of_fold = |fold: usize| {
+        let members: Vec<Sums> = parts.iter().skip(fold).step_by(folds).cloned().collect();
+        Sums::total(&members)
+    };
+    let left_out: Vec<Sums> = (0..parts.len().min(folds)).map(of_fold).collect();
     let total = Sums::total(parts);
     let rests: Vec<Sums> = left_out.iter().map(|part| total.without(part)).collect();
     let error = |powers: &[i32]| -> f64 {
         let penalty = penalty(powers, rows);
-        let fitted = rests.iter().map(|rest| solve(rest, &penalty));
-        fitted
-            .zip(&rests)
-            .zip(&left_out)
-            .map(|((solver, rest), part)| match solver {
-                Some(solver) => part.error(&solver.solve(&rest.right)),
-                None => f64::INFINITY,
-            })
-            .sum()
+        let error = |(rest, part): (&Sums, &Sums)| match solve(rest, &penalty) {
+            Some(solver) => part.error(&solver.solve(&rest.right)),
+            None => f64::INFINITY,
+        };
+        rests.iter().zip(&left_out).map(error).sum()
     };
     let mut powers = vec![penalties[penalties.len() / 2]; variables];
-    for k in (0..variables).cycle().take(rounds * variables) {
+    for k in (0..variables).cycle().take(settings.rounds * variables) {
         let tried = penalties.iter().map(|power| {
             let mut powers = powers.clone();
             powers[k] = *power;
@@ -171,7 +157,6 @@ fn smoothness(
 /// Squared second differences of neighbouring coefficients. A small multiple of their squares is added: it regularises
 /// the directions that the data do not determine, and if the penalty is large it removes slopes as well.
 fn penalty(powers: &[i32], rows: usize) -> DMatrix<f64> {
-    #[allow(clippy::cast_precision_loss)] // few samples
     let rows = rows as f64;
     let mut all = DMatrix::zeros(1 + SPLINES * powers.len(), 1 + SPLINES * powers.len());
     for (k, power) in powers.iter().enumerate() {
@@ -216,7 +201,6 @@ fn jackknife(
             .solve(&(&part.right - &part.matrix * coefficients));
         covariance += &step * step.transpose();
     }
-    #[allow(clippy::cast_precision_loss)] // few blocks
     let count = parts.len() as f64;
     Some(covariance * ((count - 1.0) / count))
 }

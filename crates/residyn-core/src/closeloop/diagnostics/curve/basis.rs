@@ -25,9 +25,8 @@ impl Basis {
         }
         let mut columns = DMatrix::zeros(values.len(), SPLINES);
         for (row, value) in values.iter().enumerate() {
-            columns
-                .row_mut(row)
-                .copy_from_slice(&splines((value - low) / (high - low)));
+            let splines = splines((value - low) / (high - low));
+            columns.row_mut(row).copy_from_slice(&splines);
         }
         let means: Vec<f64> = columns.column_iter().map(|column| column.mean()).collect();
         for (mut column, mean) in columns.column_iter_mut().zip(&means) {
@@ -42,7 +41,6 @@ impl Basis {
     }
 
     /// `count` equidistant values over the range of the basis.
-    #[allow(clippy::cast_precision_loss)] // few points
     pub fn points(&self, count: usize) -> impl Iterator<Item = f64> {
         let place = move |point: usize| point as f64 / (count - 1) as f64;
         (0..count).map(move |point| self.low + place(point) * (self.high - self.low))
@@ -51,16 +49,13 @@ impl Basis {
     /// The centred splines at a value.
     pub fn at(&self, value: f64) -> impl Iterator<Item = f64> {
         let splines = splines((value - self.low) / (self.high - self.low));
-        splines
-            .into_iter()
-            .zip(&self.means)
-            .map(|(b, mean)| b - mean)
+        let both = splines.into_iter().zip(&self.means);
+        both.map(|(b, mean)| b - mean)
     }
 }
 
 /// The cubic splines at a position from 0 to 1, constant beyond.
 fn splines(place: f64) -> [f64; SPLINES] {
-    #[allow(clippy::cast_precision_loss)] // few splines
     let pieces = (SPLINES - 3) as f64;
     let at = pieces * place.clamp(0.0, 1.0);
     let piece = at.floor().min(pieces - 1.0);
@@ -73,7 +68,6 @@ fn splines(place: f64) -> [f64; SPLINES] {
         u.powi(3),
     ];
     let mut all = [0.0; SPLINES];
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small whole number
     for (spline, part) in all[piece as usize..].iter_mut().zip(parts) {
         *spline = part / 6.0;
     }

@@ -32,35 +32,18 @@ pub struct Curve {
     pub high: Vec<f64>,
 }
 
-/// A variable that a force may depend on.
-struct Variable {
-    name: &'static str,
-    /// The units on a turning joint and on a sliding joint.
-    units: [&'static str; 2],
-    value: fn(&ForceSample, Joint) -> f64,
-}
+/// A variable that a force may depend on: its name, its units on a turning joint and on a sliding joint, and its value.
+type Variable = (
+    &'static str,
+    [&'static str; 2],
+    fn(&ForceSample, Joint) -> f64,
+);
 
 const VARIABLES: [Variable; 4] = [
-    Variable {
-        name: "q",
-        units: ["rad", "m"],
-        value: |sample, joint| sample.q[joint],
-    },
-    Variable {
-        name: "qd",
-        units: ["rad/s", "m/s"],
-        value: |sample, joint| sample.qd[joint],
-    },
-    Variable {
-        name: "tau",
-        units: ["N m", "N"],
-        value: |sample, joint| sample.tau[joint],
-    },
-    Variable {
-        name: "t",
-        units: ["s", "s"],
-        value: |sample, _| sample.time_s,
-    },
+    ("q", ["rad", "m"], |sample, joint| sample.q[joint]),
+    ("qd", ["rad/s", "m/s"], |sample, joint| sample.qd[joint]),
+    ("tau", ["N m", "N"], |sample, joint| sample.tau[joint]),
+    ("t", ["s", "s"], |sample, _| sample.time_s),
 ];
 
 /// One curve for each joint and each variable that takes more than one value; no curves if the logs are too short to
@@ -71,10 +54,8 @@ pub(super) fn curves(
     settings: &CurveSettings,
 ) -> Vec<Curve> {
     let blocks = blocks_of_times(samples.iter().map(|s| (s.log, s.time_s)), BLOCK_S);
-    if blocks
-        .last()
-        .is_none_or(|last| last + 1 < settings.fewest_blocks)
-    {
+    let are_few = |last: &usize| last + 1 < settings.fewest_blocks;
+    if blocks.last().is_none_or(are_few) {
         return Vec::new();
     }
     Joint::all(prismatic.len())
@@ -89,27 +70,25 @@ fn of_joint(
     prismatic: bool,
     settings: &CurveSettings,
 ) -> Vec<Curve> {
-    let bases: Vec<(&Variable, Basis)> = VARIABLES
-        .iter()
-        .filter_map(|variable| {
-            let values = samples.iter().map(|sample| (variable.value)(sample, joint));
-            Some((variable, Basis::over(values.collect(), settings.quantiles)?))
-        })
-        .collect();
+    let over = |variable: &'static Variable| {
+        let values = samples.iter().map(|sample| variable.2(sample, joint));
+        Some((variable, Basis::over(values.collect(), settings.quantiles)?))
+    };
+    let bases: Vec<(&Variable, Basis)> = VARIABLES.iter().filter_map(over).collect();
     let forces = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.force[joint]));
     let shapes: Vec<&Basis> = bases.iter().map(|(_, basis)| basis).collect();
     let Some(fit) = Additive::fit(&shapes, &forces, blocks, settings) else {
         return Vec::new();
     };
-    let curve = |(k, (variable, basis)): (usize, &(&Variable, Basis))| {
-        let numbered = match variable.name {
+    let curve = |(k, ((name, units, _), basis)): (usize, &(&Variable, Basis))| {
+        let numbered = match *name {
             "t" => "t".to_owned(),
             stem => joint.name(stem),
         };
         let mut curve = Curve {
             joint,
             variable: numbered,
-            unit: variable.units[usize::from(prismatic)].to_owned(),
+            unit: units[usize::from(prismatic)].to_owned(),
             x: Vec::new(),
             force: Vec::new(),
             low: Vec::new(),
@@ -168,11 +147,8 @@ mod tests {
         );
         let names: Vec<&str> = found.iter().map(|c| c.variable.as_str()).collect();
         assert_eq!(names, ["q1", "qd1", "t"]);
-        assert!(
-            found
-                .iter()
-                .all(|c| c.x.len() == CurveSettings::default().points)
-        );
+        let points = CurveSettings::default().points;
+        assert!(found.iter().all(|c| c.x.len() == points));
     }
 
     #[test]
