@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::Command;
 
-use crate::support::{refuses, succeeds, text};
+use crate::support::{succeeds, text};
 
 #[test]
 fn a_shell_reads_the_completions() {
@@ -33,13 +33,4 @@ fn every_command_has_a_manual_page() {
         let page = fs::read_to_string(manual.join(format!("{command}.1"))).unwrap();
         assert!(page.contains(".SH SYNOPSIS"), "{command}");
     }
-}
-
-#[test]
-fn an_unknown_plant_lists_the_plants() {
-    let said = refuses(&["control", "--model", "pendulum", "--plant", "nope"]);
-    assert!(
-        said.contains("one of the plants") && said.contains("pendulum-real"),
-        "{said}"
-    );
 }

@@ -5,7 +5,7 @@ use std::fs;
 use crate::support::clients::look_at;
 use crate::support::demo::demo;
 use crate::support::paths::configs;
-use crate::support::{refuses, succeeds, text};
+use crate::support::{succeeds, text};
 
 #[test]
 fn a_browser_shows_the_page_of_the_demo() {
@@ -35,22 +35,4 @@ fn page_and_text_are_made_again_from_report_json_alone() {
             [demo(), folder.path()].map(|at| fs::read_to_string(at.join(name)).unwrap());
         assert!(first == again, "the two {name} differ");
     }
-}
-
-#[test]
-fn folders_without_a_report_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let said = refuses(&["report", text(folder.path())]);
-    assert!(
-        said.contains("report.json") && said.contains("residyn closeloop"),
-        "{said}"
-    );
-    fs::write(
-        folder.path().join("report.json"),
-        "{\"schema\": 1,\n nonsense}",
-    )
-    .unwrap();
-    let said = refuses(&["report", text(folder.path())]);
-    assert!(said.contains("line 2 column"), "{said}");
-    assert!(!folder.path().join("report.html").exists());
 }

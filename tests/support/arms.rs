@@ -1,25 +1,18 @@
 //! Models of arms, and logs of their motion.
 
 use std::f64::consts::TAU;
-use std::path::Path;
 
 use rand::RngExt;
 use residyn_core::data::Log;
-use residyn_core::model::chain::{Chain, model_text};
-use residyn_core::model::{Library, Model};
+use residyn_core::model::Model;
+use residyn_core::model::chain::Chain;
 
 use super::catalogue::rng;
+use super::mechanisms::system;
 
-/// As `residyn new` writes it.
-pub fn described(chain: &Chain) -> Model {
-    let library = Library::built_in();
-    let path = Path::new(&chain.name);
-    Model::from_text(path, &model_text(chain), library.effects()).unwrap()
-}
-
-/// Its bodies only, without the effects on the joints.
+/// The model of a chain, its bodies only, without the effects on the joints.
 pub fn model(chain: &Chain) -> Model {
-    described(chain).with_effects(Vec::new())
+    system(chain).with_effects(Vec::new())
 }
 
 /// A log of sines of several frequencies in each joint, with the torques that a model needs for them.
