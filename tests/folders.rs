@@ -11,10 +11,10 @@ use std::sync::OnceLock;
 
 use residyn_io::runs::RunFolder;
 
-use crate::support::bench::{Bench, RIGS};
+use crate::support::bench::{RIGS, bench};
 use crate::support::exported_models::exported;
 use crate::support::paths::config;
-use crate::support::{refuses, says, text};
+use crate::support::{Scratch, refuses, says, text};
 
 /// The commands that work in the folder of `--out`.
 fn commands() -> Vec<Vec<String>> {
@@ -51,9 +51,9 @@ fn commands() -> Vec<Vec<String>> {
 }
 
 /// A file of rigs, and their logs.
-fn measured_rigs() -> &'static Bench {
-    static RIGS_AND_LOGS: OnceLock<Bench> = OnceLock::new();
-    RIGS_AND_LOGS.get_or_init(|| Bench::new(RIGS))
+fn measured_rigs() -> &'static Scratch {
+    static RIGS_AND_LOGS: OnceLock<Scratch> = OnceLock::new();
+    RIGS_AND_LOGS.get_or_init(|| bench(RIGS))
 }
 
 fn with_out<'a>(command: &'a [String], out: &'a str) -> Vec<&'a str> {
