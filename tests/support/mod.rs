@@ -27,4 +27,4 @@ pub use self::binary::{answers, refuses, residyn, says, succeeds, text, until_th
 #[cfg(unix)]
 pub use self::binary::{residyn_within, within};
 pub use self::measured::measured;
-pub use self::scratch::{Scratch, copy_files, replaced, swinging};
+pub use self::scratch::{Scratch, copy_files, replaced, swinging, words};

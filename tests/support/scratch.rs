@@ -188,7 +188,8 @@ pub fn replaced(text: &str, from: &str, to: &str) -> String {
     text.replacen(from, to, 1)
 }
 
-fn words(line: &str) -> impl Iterator<Item = String> {
+/// The words of a command line; `$REPO` is the repository's folder.
+pub fn words(line: &str) -> impl Iterator<Item = String> {
     line.split_whitespace()
         .map(|word| word.replace("$REPO", env!("CARGO_MANIFEST_DIR")))
 }
