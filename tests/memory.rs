@@ -7,12 +7,12 @@ use residyn_core::data::{Log, Quantity};
 use residyn_core::expr::SignForm;
 use residyn_core::identify::{Shooting, cut, fit, uncertainty};
 use residyn_core::lanes::Row;
-use residyn_core::model::{Dynamics, FittedEffect, Library};
+use residyn_core::model::{Dynamics, FittedEffect};
 use residyn_core::sim::{Commands, Hold, Sensors, StepTorque, with_own_angles};
 
 use rand::RngExt;
 
-use crate::support::catalogue::{assert_near, dynamics, fitted, rng, system};
+use crate::support::catalogue::{self, assert_all_near, assert_near, dynamics, rng, system};
 use crate::support::logs::{add_noise, simulate};
 use crate::support::reports::{error, estimate, names};
 use crate::support::{Scratch, says};
@@ -21,7 +21,7 @@ const DELAY_S: f64 = 0.0073;
 const LAG_S: f64 = 0.015;
 
 fn effect(name: &str, value: f64) -> FittedEffect {
-    fitted(Library::built_in().effect(name).unwrap(), 0, &[value])
+    catalogue::effect(name, 0, &[value])
 }
 
 /// A mass of 1 with these filters: acceleration equals torque.
@@ -95,10 +95,9 @@ fn mean_torques_match_those_of_fine_steps() {
             (100.07, 100.09, 3),
         ] {
             let found = means(&model, from, to, parts).0;
-            for (found, wanted) in found.iter().zip(stepped(delay, lag, from, to, parts)) {
-                // Jumps of up to 4 N m fall within steps of 1 us, in parts of 2 ms and more.
-                assert_near(*found, wanted, 4e-3, &format!("{delay} {lag} {from}"));
-            }
+            let wanted = stepped(delay, lag, from, to, parts);
+            // Jumps of up to 4 N m fall within steps of 1 us, in parts of 2 ms and more.
+            assert_all_near(&found, &wanted, 4e-3, &format!("{delay} {lag} {from}"));
         }
     }
 }
@@ -249,11 +248,7 @@ fn expressions_of_filters_state_what_they_do_to_the_command() {
 }
 
 fn backlash(delta: f64, driven: f64) -> FittedEffect {
-    fitted(
-        Library::built_in().effect("backlash").unwrap(),
-        0,
-        &[delta, driven],
-    )
+    catalogue::effect("backlash", 0, &[delta, driven])
 }
 
 #[test]
@@ -285,9 +280,8 @@ fn play_separates_the_measured_angle_from_the_links() {
 
 #[test]
 fn a_disc_off_its_axis_reads_ahead_and_behind() {
-    let library = Library::built_in();
-    let disc = library.effect("encoder_eccentricity").unwrap();
-    let model = pendulum(&[fitted(disc, 0, &[0.02, -0.01])]);
+    let disc = catalogue::effect("encoder_eccentricity", 0, &[0.02, -0.01]);
+    let model = pendulum(&[disc]);
     let mut sensors = Sensors::<1>::new(&model);
     for (angle, ahead) in [(0.0, -0.01), (FRAC_PI_2, 0.02), (PI, 0.01)] {
         let state = [Row([angle]), Row([0.0])];

@@ -14,7 +14,7 @@ use residyn_report::Report;
 use serde_json::{Value, json};
 
 use crate::support::arms::{model, moved};
-use crate::support::catalogue::{fitted, rng};
+use crate::support::catalogue::{effect, rng};
 use crate::support::clients::client;
 use crate::support::measured;
 use crate::support::mechanisms::{fixture, read_to, system};
@@ -26,10 +26,7 @@ fn declared() -> Model {
 
 /// The arm as built: bodies off by 10 to 25 %, and effects with these values on some joints.
 fn rig(effects: &[(usize, &str, &[f64])]) -> Model {
-    let library = Library::built_in();
-    let of = |(joint, name, values): &(usize, &str, &[f64])| {
-        fitted(library.effect(name).unwrap(), *joint, values)
-    };
+    let of = |(joint, name, values): &(usize, &str, &[f64])| effect(name, *joint, values);
     let mut rig = declared()
         .with_effects(effects.iter().map(of).collect())
         .with_smoothing_velocities(vec![0.02; 4]);

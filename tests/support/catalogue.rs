@@ -33,6 +33,11 @@ pub fn fitted(effect: &Effect, joint: usize, values: &[f64]) -> FittedEffect {
     }
 }
 
+/// A built-in effect on a joint (counted from 0) with these values.
+pub fn effect(name: &str, joint: usize, values: &[f64]) -> FittedEffect {
+    fitted(Library::built_in().effect(name).unwrap(), joint, values)
+}
+
 /// Uses the same form of the sign on every joint.
 pub fn dynamics(system: &Model, effects: &[FittedEffect], sign: SignForm) -> Dynamics {
     let width = match sign {
@@ -172,4 +177,13 @@ pub fn assert_near(found: f64, wanted: f64, share: f64, what: &str) {
         off <= share,
         "{what}: found {found}, wanted {wanted}, off by {off:e}"
     );
+}
+
+/// Fails unless each number is near the wanted one, as in [`assert_near`].
+#[track_caller]
+pub fn assert_all_near(found: &[f64], wanted: &[f64], share: f64, what: &str) {
+    assert_eq!(found.len(), wanted.len(), "{what}");
+    for (found, wanted) in found.iter().zip(wanted) {
+        assert_near(*found, *wanted, share, what);
+    }
 }
