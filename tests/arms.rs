@@ -223,42 +223,26 @@ fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
     }
 }
 
+/// An arm, the log that is fitted and the one for the test, the time at which both begin, the share of the log that is
+/// fitted, and the error by least squares on base parameters in per cent (figures in the READMEs of the data sets).
+const MEASURED: &str = "
+panda     | exciting_trajectory.csv      | exciting_trajectory.csv      | 0.0 | 0.7  | 1.59
+kuka_lwr4 | measurements_1.csv           | measurements_2.csv           | 2.5 | 1.0  | 3.08
+ur10      | ur10_exciting_trajectory.csv | ur10_exciting_trajectory.csv | 0.0 | 0.65 | 7.28
+";
+
 /// Fitted near its URDF's values, with the friction that every arm has, an arm's torques on the part of its log that
 /// was not fitted are as accurate as by least squares on base parameters (figures in the READMEs of the data sets).
 #[test]
 fn fitted_torques_of_measured_arms_are_as_near_as_by_least_squares() {
-    for (arm, train, test, first_s, share, least_squares) in [
-        (
-            "panda",
-            "exciting_trajectory.csv",
-            "exciting_trajectory.csv",
-            0.0,
-            0.7,
-            1.59,
-        ),
-        (
-            "kuka_lwr4",
-            "measurements_1.csv",
-            "measurements_2.csv",
-            2.5,
-            1.0,
-            3.08,
-        ),
-        (
-            "ur10",
-            "ur10_exciting_trajectory.csv",
-            "ur10_exciting_trajectory.csv",
-            0.0,
-            0.65,
-            7.28,
-        ),
-    ] {
-        let Some(data) = measured(arm) else {
+    for [arm, train, test, numbers @ ..] in rows::<6>(MEASURED) {
+        let [first_s, share, least_squares] = numbers.map(|number| number.parse::<f64>().unwrap());
+        let Some(data) = measured(&arm) else {
             continue;
         };
         let declared = model(&read_to(&data.join(format!("{arm}.urdf")), None));
         let log = |name: &str| read_log(data.join(name), &declared).unwrap();
-        let [mut train, mut test] = [log(train), log(test)];
+        let [mut train, mut test] = [log(&train), log(&test)];
         let split_s = train.time[((train.rows() - 1) as f64 * share) as usize];
         let span = |start_s: f64, end_s: f64| Interval { start_s, end_s };
         train.leave_out = vec![span(-1.0, first_s)];
