@@ -194,7 +194,7 @@ sweep --config $REPO/configs/smoke/train-pendulum.toml --out out --seeds 1000000
 closeloop --out out --calibrate 100000000000                | from 1 to 100000
 closeloop --out out --calibrate 0                           | --calibrate
 control --model pendulum --plant pendulum-sim --episodes 100000000000 | from 1 to 100000
-audit -                                                     | -: ... standard input is not read ... write it to a file
+evaluate --model pendulum --test - | -: ... standard input is not read ... write it to a file
 ";
 
 #[test]

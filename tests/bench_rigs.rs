@@ -110,7 +110,7 @@ fn what_the_models_and_logs_of_a_rig_lack_is_reported() {
     }
     for [flags, words] in rows(
         "--rigs no-such-file.toml --data .       | give a file of rigs with --rigs
-         --data . --only nothing-of-the-kind     | no rig's name contains",
+         --rigs $REPO/configs/bench/rigs.toml --data . --only nothing-of-the-kind | no rig's name contains",
     ) {
         let message = Scratch::new().refuses(&format!("bench rigs {flags}"));
         says(&message, &[&words]);
