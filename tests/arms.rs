@@ -12,7 +12,8 @@ use residyn_core::sim::metric::torque_error;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::support::arms::{model, moved};
+use crate::support::arms::{as_built, model, moved};
+use crate::support::catalogue::effect;
 use crate::support::clients::client;
 use crate::support::mechanisms::{fixture, read_to};
 use crate::support::tables::{rows, says_words};
@@ -147,35 +148,18 @@ fn torques_need_a_model_of_torques_and_a_log_of_a_second() {
 fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
     let declared = model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
     let friction = |level: f64| -> Vec<FittedEffect> {
-        let effect = |joint: usize, name: &str, value: f64| {
-            crate::support::catalogue::fitted(
-                Library::built_in().effect(name).unwrap(),
-                joint,
-                &[value],
-            )
+        let of_joint = |j: usize| {
+            let viscous = effect("viscous_friction", j, &[level]);
+            [viscous, effect("coulomb_friction", j, &[2.0 * level])]
         };
-        (0..4)
-            .flat_map(|j| {
-                [
-                    effect(j, "viscous_friction", level),
-                    effect(j, "coulomb_friction", 2.0 * level),
-                ]
-            })
-            .collect()
+        (0..4).flat_map(of_joint).collect()
     };
     let with = |level: f64| {
         declared
             .with_effects(friction(level))
             .with_smoothing_velocities(vec![0.02; 4])
     };
-    let mut rig = with(0.4);
-    for (k, body) in rig.inertias().into_iter().enumerate() {
-        // Another body of the same shape: still physical.
-        let factor = [1.2, 0.85, 1.15, 0.9, 1.25][k];
-        for parameter in body {
-            rig.parameters[parameter].value *= factor;
-        }
-    }
+    let rig = as_built(&with(0.4));
     let [train, test] = [1, 2].map(|seed| vec![moved(&rig, 20.0, seed)]);
     let found = fit_torques(&with(0.1), &declared, &train).unwrap();
     assert!(

@@ -1,15 +1,14 @@
 //! Every effect against a definition written by hand, with the exact sign.
 
 use rand::RngExt;
-use residyn::with_effects_in;
 use residyn_core::data::Joint;
 use residyn_core::expr::SignForm;
 use residyn_core::model::{Effect, FittedEffect, Library};
 
 use crate::support::arms;
 use crate::support::catalogue::{
-    USER_EFFECT, assert_all_near, assert_near, dynamics, effect, fitted, library_with_user_effect,
-    points, rng, system,
+    assert_all_near, assert_near, dynamics, effect, fitted, library_with_user_effect, points, rng,
+    system,
 };
 use crate::support::mechanisms::{fixture, read_to};
 use crate::support::oracles::ORACLES;
@@ -338,16 +337,4 @@ fn an_effect_of_a_users_folder_acts() {
         let found = model.program.eval(&point)[1];
         assert_near(found, wanted, ROUNDING, "eddy_brake");
     }
-}
-
-#[test]
-fn an_effect_of_a_users_folder_replaces_one_of_its_name() {
-    let folder = tempfile::tempdir().unwrap();
-    let text = USER_EFFECT.replace("eddy_brake", "viscous_friction");
-    std::fs::write(folder.path().join("any.toml"), text).unwrap();
-    let built_in = Library::built_in();
-    let library = with_effects_in(folder.path(), Library::built_in()).unwrap();
-    assert_eq!(library.effects().len(), built_in.effects().len());
-    let parameters = &library.effect("viscous_friction").unwrap().parameters;
-    assert_eq!(parameters[0].name, "T_m");
 }

@@ -6,7 +6,7 @@ use residyn_core::expr::SignForm;
 use residyn_core::model::Dynamics;
 use residyn_core::model::chain::{Chain, model_text};
 
-use crate::support::catalogue::{dynamics, points};
+use crate::support::catalogue::{assert_energy_balanced, dynamics, points};
 use crate::support::mechanisms::{
     FILES, comparable, fixture, format_of, mujoco_agrees, read, read_to, system,
 };
@@ -39,15 +39,9 @@ fn energy_changes_by_the_power() {
     for (name, tip) in FILES {
         let system = system(&read_to(&fixture(name), tip));
         let model = dynamics(&system, &[], SignForm::Exact);
-        let program = system.energy_program().unwrap();
-        for point in states(&model, 200) {
-            let (rates, energy) = (model.program.eval(&point), program.eval(&point));
-            let parts: Vec<f64> = energy[2..].iter().zip(&rates).map(|(s, r)| s * r).collect();
-            let size: f64 = parts.iter().map(|part| part.abs()).sum();
-            let off = parts.iter().sum::<f64>() - energy[1];
-            // Coefficients are rounded to 15 digits.
-            assert!(off.abs() <= 1e-12 * size, "{name}: {off:e} of {size}");
-        }
+        let energy = system.energy_program().unwrap();
+        // Coefficients are rounded to 15 digits.
+        assert_energy_balanced(&model, &energy, &states(&model, 200), 1e-12);
     }
 }
 

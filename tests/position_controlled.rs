@@ -13,7 +13,7 @@ use residyn_report as report;
 use residyn_report::Report;
 use serde_json::{Value, json};
 
-use crate::support::arms::{model, moved};
+use crate::support::arms::{as_built, model, moved};
 use crate::support::catalogue::{effect, rng};
 use crate::support::clients::client;
 use crate::support::measured;
@@ -27,16 +27,8 @@ fn declared() -> Model {
 /// The arm as built: bodies off by 10 to 25 %, and effects with these values on some joints.
 fn rig(effects: &[(usize, &str, &[f64])]) -> Model {
     let of = |(joint, name, values): &(usize, &str, &[f64])| effect(name, *joint, values);
-    let mut rig = declared()
-        .with_effects(effects.iter().map(of).collect())
-        .with_smoothing_velocities(vec![0.02; 4]);
-    for (k, body) in rig.inertias().into_iter().enumerate() {
-        let factor = [1.2, 0.85, 1.15, 0.9, 1.25][k];
-        for parameter in body {
-            rig.parameters[parameter].value *= factor;
-        }
-    }
-    rig
+    let rig = declared().with_effects(effects.iter().map(of).collect());
+    as_built(&rig.with_smoothing_velocities(vec![0.02; 4]))
 }
 
 /// A log of the rig under stiff control, with the noise of encoders and of currents.
