@@ -10,6 +10,7 @@ use residyn_core::model::FittedEffect;
 use residyn_core::model::check::{Check, Finding, Severity};
 use serde_json::Value;
 
+use crate::support::paths::ours;
 use crate::support::tables::rows;
 use crate::support::{Scratch, replaced, says, succeeds, text};
 
@@ -21,10 +22,8 @@ fn check(file: &str) -> Check {
 
 /// Every TOML file in a folder of the project that describes a system.
 fn shipped(folder: &str) -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
-    let files = fs::read_dir(&folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path());
+    let entries = fs::read_dir(ours(folder)).unwrap();
+    let files = entries.map(|entry| entry.unwrap().path());
     let is_model =
         |path: &PathBuf| path.is_file() && fs::read_to_string(path).unwrap().contains("[system]");
     files.filter(is_model).collect()

@@ -24,6 +24,7 @@ use serde_json::Value;
 
 use crate::support::catalogue::{catalog, rng};
 use crate::support::logs::simulate;
+use crate::support::tables::rows;
 use crate::support::{Scratch, measured, says};
 
 /// A pendulum with dry friction, thrown so that it turns over.
@@ -104,79 +105,51 @@ fn within_turn(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 
-/// What a logger does to a log, and words of the finding that names the fault.
-type Case = (fn(&mut Log), &'static str);
+/// What a logger does to the columns of a log: a factor, or turns that are not counted; and words of the finding that
+/// names the fault.
+const MISREAD: &str = "
+time 1e3                      | the time looks like ms
+time 1e6                      | the time looks like us
+time 1e9                      | the time looks like ns
+tau -1                        | tau1 has the opposite sign
+qd -1                         | qd1 follows -dq1/dt
+q deg                         | q1 looks like deg
+qd deg                        | qd1 looks like deg/s
+qd rpm                        | qd1 looks like rpm
+q deg, qd deg                 | q1 and qd1 look like deg and deg/s
+q turn                        | q1 jumps by a full turn (6.28
+q turn, q deg                 | q1 jumps by a full turn (360)
+qd 0                          | qd1 is 0 rad/s throughout
+time 1e6, q turn, tau -1      | the time looks like us
+q -1, qd -1                   | tau1
+";
 
-const MISREAD: [Case; 14] = [
-    (
-        |log| each(&mut log.time, |t| 1e3 * t),
-        "the time looks like ms",
-    ),
-    (
-        |log| each(&mut log.time, |t| 1e6 * t),
-        "the time looks like us",
-    ),
-    (
-        |log| each(&mut log.time, |t| 1e9 * t),
-        "the time looks like ns",
-    ),
-    (
-        |log| each(&mut log.tau[0], |tau| -tau),
-        "tau1 has the opposite sign",
-    ),
-    (|log| each(&mut log.qd[0], |qd| -qd), "qd1 follows -dq1/dt"),
-    (
-        |log| each(&mut log.q[0], f64::to_degrees),
-        "q1 looks like deg",
-    ),
-    (
-        |log| each(&mut log.qd[0], f64::to_degrees),
-        "qd1 looks like deg/s",
-    ),
-    (
-        |log| each(&mut log.qd[0], |qd| 30.0 / PI * qd),
-        "qd1 looks like rpm",
-    ),
-    (
-        |log| {
-            each(&mut log.q[0], f64::to_degrees);
-            each(&mut log.qd[0], f64::to_degrees);
-        },
-        "q1 and qd1 look like deg and deg/s",
-    ),
-    (
-        |log| each(&mut log.q[0], within_turn),
-        "q1 jumps by a full turn (6.28",
-    ),
-    (
-        |log| each(&mut log.q[0], |q| within_turn(q).to_degrees()),
-        "q1 jumps by a full turn (360)",
-    ),
-    (|log| log.qd[0].fill(0.0), "qd1 is 0 rad/s throughout"),
-    (
-        |log| {
-            each(&mut log.time, |t| 1e6 * t);
-            each(&mut log.q[0], within_turn);
-            each(&mut log.tau[0], |tau| -tau);
-        },
-        "the time looks like us",
-    ),
-    (
-        |log| {
-            each(&mut log.q[0], |q| -q);
-            each(&mut log.qd[0], |qd| -qd);
-        },
-        "tau1",
-    ),
-];
+fn misread(log: &mut Log, faults: &str) {
+    for fault in faults.split(", ") {
+        let (column, what) = fault.split_once(' ').unwrap();
+        let values = match column {
+            "time" => &mut log.time,
+            "q" => &mut log.q[0],
+            "qd" => &mut log.qd[0],
+            _ => &mut log.tau[0],
+        };
+        let scale = |factor: f64| move |value: f64| factor * value + 0.0;
+        match what {
+            "turn" => each(values, within_turn),
+            "deg" => each(values, f64::to_degrees),
+            "rpm" => each(values, scale(30.0 / PI)),
+            factor => each(values, scale(factor.parse().unwrap())),
+        }
+    }
+}
 
 #[test]
 fn what_is_misread_is_named_and_mended_by_the_lines_to_paste() {
     assert!(findings(&desk(|_| {}), "serious", "").is_empty());
-    for (change, words) in MISREAD {
-        let desk = desk(change);
+    for [faults, words] in rows(MISREAD) {
+        let desk = desk(|log| misread(log, &faults));
         let serious = findings(&desk, "serious", "");
-        let named = |finding: &Value| finding["text"].as_str().unwrap().contains(words);
+        let named = |finding: &Value| finding["text"].as_str().unwrap().contains(&words);
         assert!(serious.iter().any(named), "{words}: {serious:#?}");
         write_model(&desk, &remedies(&serious, "columns"));
         let left = findings(&desk, "serious", "--model model.toml");
