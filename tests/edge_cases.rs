@@ -11,7 +11,7 @@ use residyn_train::ResidualTrainer;
 use crate::support::catalogue::{rng, system};
 use crate::support::logs::simulate;
 use crate::support::tables::{rows, says_words};
-use crate::support::{Scratch, says, succeeds, swinging, text};
+use crate::support::{Scratch, says, swinging};
 
 /// A pendulum that gives a mass and a bias, so that its motion is compared through its torques.
 const ROD: &str = include_str!("fixtures/rod.toml");
@@ -54,7 +54,7 @@ fn a_network_that_diverges_leaves_the_report_without_one() {
     );
     says(&scratch.read("report.html"), &[failed]);
     assert!(scratch.path("checkpoint").is_dir());
-    succeeds(&["report", text(scratch.folder())]);
+    scratch.succeeds("report .");
 }
 
 #[test]
