@@ -12,10 +12,12 @@ use residyn_core::sim::metric::torque_error;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::support::arms::{model, moved};
+use crate::support::arms::{as_built, model, moved};
+use crate::support::catalogue::effect;
 use crate::support::clients::client;
 use crate::support::mechanisms::{fixture, read_to};
-use crate::support::{measured, refuses, succeeds, text};
+use crate::support::tables::{rows, says_words};
+use crate::support::{Scratch, answers, measured, replaced, says, text};
 
 /// Results of Pinocchio and MuJoCo for an arm.
 #[derive(Deserialize)]
@@ -38,21 +40,6 @@ fn off(found: &[f64], wanted: &[f64]) -> f64 {
     differences.fold(0.0, f64::max) / size
 }
 
-/// Energy changes by the power of the torques, also if a joint follows another.
-#[test]
-fn energy_of_a_linkage_changes_by_the_power() {
-    let model = model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
-    let (dynamics, energy) = (model.dynamics(), model.energy_program().unwrap());
-    for point in crate::support::catalogue::points(&dynamics, 100, 3) {
-        let point = [&point[..13], &model.values()].concat();
-        let (rates, energy) = (dynamics.program.eval(&point), energy.eval(&point));
-        let parts: Vec<f64> = energy[2..].iter().zip(&rates).map(|(s, r)| s * r).collect();
-        let size: f64 = parts.iter().map(|part| part.abs()).sum();
-        let off = parts.iter().sum::<f64>() - energy[1];
-        assert!(off.abs() <= 1e-12 * size, "{off:e} of {size}");
-    }
-}
-
 /// A chain ends at the requested link; bodies attached elsewhere move with it.
 #[test]
 fn branches_are_welded_and_noted() {
@@ -68,62 +55,39 @@ fn branches_are_welded_and_noted() {
     assert!((slide.inertia.mass - 0.9).abs() < 1e-15);
     assert!(!whole.notes.iter().any(|n| n.contains("what acts on")));
     // The effects of a joint off the chain do not matter.
-    let folder = tempfile::tempdir().unwrap();
-    let other = folder.path().join("other.urdf");
+    let scratch = Scratch::new();
     let description = fs::read_to_string(&file).unwrap();
-    let odd = "<joint name=\"left\" type=\"planar\">";
-    fs::write(
-        &other,
-        description.replace("<joint name=\"left\" type=\"prismatic\">", odd),
-    )
-    .unwrap();
-    assert_eq!(read_to(&other, Some("hand")).joints, whole.joints);
+    let left = |kind: &str| format!("<joint name=\"left\" type=\"{kind}\">");
+    let odd = replaced(&description, &left("prismatic"), &left("planar"));
+    scratch.file("other.urdf", odd);
+    let other = read_to(&scratch.path("other.urdf"), Some("hand"));
+    assert_eq!(other.joints, whole.joints);
     let short = read_to(&file, Some("slide"));
     assert_eq!(short.joints.len(), 4);
     assert!((short.joints[3].inertia.mass - 1.3).abs() < 1e-15);
-    let said = refuses(&["new", "--from-urdf", text(&file)]);
-    assert!(said.contains("`left_finger` and `hand` move"), "{said}");
-    let said = refuses(&["new", "--from-urdf", text(&file), "--tip", "hant"]);
-    assert!(
-        said.contains("no body `hant`") && said.contains("`hand`"),
-        "{said}"
-    );
-    let shown = succeeds(&["new", "--from-urdf", text(&file), "--tip", "hand"]);
-    assert!(
-        shown.contains("ratio = -0.8\noffset = 0.3\nslides = false"),
-        "{shown}"
-    );
+    let new = "new --from-urdf $REPO/tests/fixtures/mechanisms/linkage_4r.urdf";
+    let said = scratch.refuses(new);
+    says(&said, &["`left_finger` and `hand` move"]);
+    let said = scratch.refuses(&format!("{new} --tip hant"));
+    says(&said, &["no body `hant`", "`hand`"]);
+    let said = scratch.succeeds(&format!("{new} --tip hand"));
+    says(&said, &["ratio = -0.8\noffset = 0.3\nslides = false"]);
 }
 
 /// Error of the torques of an arm as its URDF describes it, in per cent of the logged torques, on a log's rows from
 /// this fraction on.
 fn error_of_torques(arm: &str, log: &str, from: f64) -> Option<f64> {
     let data = measured(arm)?;
-    let folder = tempfile::tempdir().unwrap();
+    let scratch = Scratch::new();
     let rows = fs::read_to_string(data.join(log)).unwrap();
     let rows: Vec<&str> = rows.lines().collect();
     let count = (rows.len() - 1) as f64;
     let first = 1 + rows.len().min((from * count) as usize);
-    let [model, part] = ["model.toml", "part.csv"].map(|name| folder.path().join(name));
-    fs::write(&part, [&rows[..1], &rows[first..]].concat().join("\n")).unwrap();
-    let description = data.join(format!("{arm}.urdf"));
-    succeeds(&[
-        "new",
-        "--from-urdf",
-        text(&description),
-        "--out",
-        text(&model),
-    ]);
-    let (model, part) = (text(&model), text(&part));
-    let horizon = ["--horizon", "0.02", "--torque", "--json"];
-    let message = succeeds(
-        &[
-            &["evaluate", "--model", model, "--test", part],
-            &horizon[..],
-        ]
-        .concat(),
-    );
-    let message: Value = serde_json::from_str(&message).unwrap();
+    let part = [&rows[..1], &rows[first..]].concat().join("\n");
+    scratch.file("part.csv", part);
+    scratch.new_model(&data.join(format!("{arm}.urdf")));
+    let evaluate = "evaluate --model model.toml --test part.csv";
+    let message = scratch.json(&format!("{evaluate} --horizon 0.02 --torque"));
     let joints = message["torque"]["rms"].as_array().unwrap().len();
     assert_eq!(
         joints,
@@ -154,47 +118,28 @@ fn the_same_motion_of_a_measured_arm_is_reported() {
         return;
     };
     let logs = ["measurements_1.csv", "measurements_2.csv"].map(|name| data.join(name));
-    let model = tempfile::tempdir().unwrap();
-    let file = model.path().join("model.toml");
-    let description = data.join("kuka_lwr4.urdf");
-    succeeds(&[
-        "new",
-        "--from-urdf",
-        text(&description),
-        "--out",
-        text(&file),
-    ]);
-    let said = crate::support::answers(&[
-        "audit",
-        "--model",
-        text(&file),
-        text(&logs[0]),
-        text(&logs[1]),
-    ]);
-    assert!(
-        said.contains("the motion repeats that of measurements_1.csv"),
-        "{said}"
-    );
+    let scratch = Scratch::new();
+    let model = scratch.new_model(&data.join("kuka_lwr4.urdf"));
+    let audit = ["audit", "--model", &model, text(&logs[0]), text(&logs[1])];
+    let repeats = "the motion repeats that of measurements_1.csv";
+    says(&answers(&audit), &[repeats]);
 }
+
+/// A plant's log of some seconds, the command that asks for its torques, and words of the message.
+const TORQUES: &str = "
+acrobot  | 0.9 | evaluate --model acrobot --test acrobot.csv --horizon 0.02 --torque | longer than a second
+pendulum | 3   | evaluate --model pendulum --test pendulum.csv --torque | pendulum gives accelerations
+";
 
 #[test]
 fn torques_need_a_model_of_torques_and_a_log_of_a_second() {
-    let folder = tempfile::tempdir().unwrap();
-    let log = folder.path().join("log.csv");
-    let short = ["--duration", "0.9", "--out", text(&log)];
-    succeeds(&[&["simulate", "--plant", "acrobot"], &short[..]].concat());
-    let evaluate = |model: &str| {
-        let test = ["--test", text(&log), "--horizon", "0.02", "--torque"];
-        refuses(&[&["evaluate", "--model", model], &test[..]].concat())
-    };
-    let said = evaluate("acrobot");
-    assert!(said.contains("longer than a second"), "{said}");
-    let one = folder.path().join("one.csv");
-    let short = ["--duration", "3", "--out", text(&one)];
-    succeeds(&[&["simulate", "--plant", "pendulum"], &short[..]].concat());
-    let test = ["--test", text(&one), "--torque"];
-    let said = refuses(&[&["evaluate", "--model", "pendulum"], &test[..]].concat());
-    assert!(said.contains("pendulum gives accelerations"), "{said}");
+    let scratch = Scratch::new();
+    for [plant, seconds, line, words] in rows(TORQUES) {
+        scratch.succeeds(&format!(
+            "simulate --plant {plant} --duration {seconds} --out {plant}.csv"
+        ));
+        says_words(&scratch.refuses(&line), &words);
+    }
 }
 
 /// Body parameters that are off by 10 to 20 % are recovered from torques, as far as the motion determines them,
@@ -203,35 +148,18 @@ fn torques_need_a_model_of_torques_and_a_log_of_a_second() {
 fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
     let declared = model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
     let friction = |level: f64| -> Vec<FittedEffect> {
-        let effect = |joint: usize, name: &str, value: f64| {
-            crate::support::catalogue::fitted(
-                Library::built_in().effect(name).unwrap(),
-                joint,
-                &[value],
-            )
+        let of_joint = |j: usize| {
+            let viscous = effect("viscous_friction", j, &[level]);
+            [viscous, effect("coulomb_friction", j, &[2.0 * level])]
         };
-        (0..4)
-            .flat_map(|j| {
-                [
-                    effect(j, "viscous_friction", level),
-                    effect(j, "coulomb_friction", 2.0 * level),
-                ]
-            })
-            .collect()
+        (0..4).flat_map(of_joint).collect()
     };
     let with = |level: f64| {
         declared
             .with_effects(friction(level))
             .with_smoothing_velocities(vec![0.02; 4])
     };
-    let mut rig = with(0.4);
-    for (k, body) in rig.inertias().into_iter().enumerate() {
-        // Another body of the same shape: still physical.
-        let factor = [1.2, 0.85, 1.15, 0.9, 1.25][k];
-        for parameter in body {
-            rig.parameters[parameter].value *= factor;
-        }
-    }
+    let rig = as_built(&with(0.4));
     let [train, test] = [1, 2].map(|seed| vec![moved(&rig, 20.0, seed)]);
     let found = fit_torques(&LevenbergMarquardt::USUAL, &with(0.1), &declared, &train).unwrap();
     assert!(
@@ -279,42 +207,26 @@ fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
     }
 }
 
+/// An arm, the log that is fitted and the one for the test, the time at which both begin, the share of the log that is
+/// fitted, and the error by least squares on base parameters in per cent (figures in the READMEs of the data sets).
+const MEASURED: &str = "
+panda     | exciting_trajectory.csv      | exciting_trajectory.csv      | 0.0 | 0.7  | 1.59
+kuka_lwr4 | measurements_1.csv           | measurements_2.csv           | 2.5 | 1.0  | 3.08
+ur10      | ur10_exciting_trajectory.csv | ur10_exciting_trajectory.csv | 0.0 | 0.65 | 7.28
+";
+
 /// Fitted near its URDF's values, with the friction that every arm has, an arm's torques on the part of its log that
 /// was not fitted are as accurate as by least squares on base parameters (figures in the READMEs of the data sets).
 #[test]
 fn fitted_torques_of_measured_arms_are_as_near_as_by_least_squares() {
-    for (arm, train, test, first_s, share, least_squares) in [
-        (
-            "panda",
-            "exciting_trajectory.csv",
-            "exciting_trajectory.csv",
-            0.0,
-            0.7,
-            1.59,
-        ),
-        (
-            "kuka_lwr4",
-            "measurements_1.csv",
-            "measurements_2.csv",
-            2.5,
-            1.0,
-            3.08,
-        ),
-        (
-            "ur10",
-            "ur10_exciting_trajectory.csv",
-            "ur10_exciting_trajectory.csv",
-            0.0,
-            0.65,
-            7.28,
-        ),
-    ] {
-        let Some(data) = measured(arm) else {
+    for [arm, train, test, numbers @ ..] in rows::<6>(MEASURED) {
+        let [first_s, share, least_squares] = numbers.map(|number| number.parse::<f64>().unwrap());
+        let Some(data) = measured(&arm) else {
             continue;
         };
         let declared = model(&read_to(&data.join(format!("{arm}.urdf")), None));
         let log = |name: &str| read_log(data.join(name), &declared).unwrap();
-        let [mut train, mut test] = [log(train), log(test)];
+        let [mut train, mut test] = [log(&train), log(&test)];
         let split_s = train.time[((train.rows() - 1) as f64 * share) as usize];
         let span = |start_s: f64, end_s: f64| Interval { start_s, end_s };
         train.leave_out = vec![span(-1.0, first_s)];

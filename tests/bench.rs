@@ -1,6 +1,6 @@
 //! The bench: its hand-written rigs against the equations of the model files, and a small grid end to end.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -10,12 +10,12 @@ use residyn_core::sim::metric::assess;
 use residyn_io::write_log;
 use residyn_validation::{Cell, Group, Hidden, Mechanics, Source, read, recorded};
 
-use crate::support::{refuses, succeeds, text};
+use crate::support::paths::configs;
+use crate::support::tables::rows;
+use crate::support::{Scratch, says};
 
-fn path(name: &str) -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("configs/bench")
-        .join(name)
+fn path(name: &str) -> PathBuf {
+    configs().join("bench").join(name)
 }
 
 #[test]
@@ -106,31 +106,14 @@ fn rigs_are_drawn_by_their_rules_and_the_same_each_time() {
 }
 
 #[test]
-fn a_wrong_grid_or_selection_is_refused() {
-    let grid = path("smoke.toml");
-    let message = refuses(&[
-        "bench",
-        "effects",
-        "--grid",
-        text(&grid),
-        "--only",
-        "nothing-of-the-kind",
-    ]);
-    assert!(message.contains("no cell's name contains"), "{message}");
-    let message = refuses(&["bench", "effects", "--grid", "no-such-grid.toml"]);
-    assert!(message.contains("give a grid with --grid"), "{message}");
-}
-
-#[test]
 fn logs_recorded_by_another_program_are_cells() {
-    let folder = tempfile::tempdir().unwrap();
-    let rig = folder.path().join("rig-01");
-    std::fs::create_dir(&rig).unwrap();
+    let scratch = Scratch::new();
+    std::fs::create_dir(scratch.path("rig-01")).unwrap();
     let cell = &read(&path("smoke.toml")).unwrap()[0];
     let system = read_model(&cell.model, &Library::built_in()).unwrap();
     let (logs, truth) = cell.record(&system).unwrap();
     for log in &logs {
-        write_log(log, rig.join(&log.path)).unwrap();
+        write_log(log, scratch.path("rig-01").join(&log.path)).unwrap();
     }
     let described = serde_json::json!({
         "group": "single", "plant": "rig", "recorded_by": "another", "model": "pendulum",
@@ -138,17 +121,29 @@ fn logs_recorded_by_another_program_are_cells() {
         "logs": ["log1.csv", "log2.csv", "log3.csv"],
         "declared": truth.declared,
     });
-    std::fs::write(rig.join("cell.json"), described.to_string()).unwrap();
-    let cells = recorded(folder.path(), &path("smoke.toml")).unwrap();
+    scratch.file("rig-01/cell.json", described.to_string());
+    let cells = recorded(scratch.folder(), &path("smoke.toml")).unwrap();
     assert_eq!(cells[0].id, "rig/coulomb_friction@1(F_c=0.2)/another/1");
     let (again, same_truth) = cells[0].record(&system).unwrap();
     assert_eq!((again[2].q.clone(), same_truth), (logs[2].q.clone(), truth));
-    std::fs::write(rig.join("cell.json"), "{}").unwrap();
-    let message = refuses(&["bench", "effects", "--logs", text(folder.path())]);
-    assert!(
-        message.contains("cell.json: missing field `group`"),
-        "{message}"
-    );
+}
+
+/// Flags of `residyn bench effects`, and words of the message.
+const REFUSED: &str = "
+--grid $REPO/configs/bench/smoke.toml --only nothing-of-the-kind | no cell's name contains
+--grid no-such-grid.toml                                         | give a grid with --grid
+--logs recorded                                                  | cell.json: missing field `group`
+";
+
+#[test]
+fn a_wrong_grid_or_selection_is_refused() {
+    let scratch = Scratch::new();
+    std::fs::create_dir_all(scratch.path("recorded/rig-01")).unwrap();
+    scratch.file("recorded/rig-01/cell.json", "{}");
+    for [flags, words] in rows(REFUSED) {
+        let message = scratch.refuses(&format!("bench effects {flags}"));
+        says(&message, &[&words]);
+    }
 }
 
 mod slow {
@@ -223,34 +218,21 @@ mod slow {
 
     #[test]
     fn a_small_grid_gives_a_table_and_a_broken_run_goes_on() {
-        let folder = tempfile::tempdir().unwrap();
-        let (grid, out) = (path("smoke.toml"), folder.path());
-        let run = |only: &[&str]| {
-            let mut arguments = vec![
-                "bench",
-                "effects",
-                "--grid",
-                text(&grid),
-                "--out",
-                text(out),
-            ];
-            arguments.extend(["--json", "--only"]);
-            arguments.extend(only);
-            let summary: serde_json::Value = serde_json::from_str(&succeeds(&arguments)).unwrap();
-            summary
+        let scratch = Scratch::new();
+        let run = |only: &str| {
+            let grid = "--grid $REPO/configs/bench/smoke.toml";
+            scratch.json(&format!("bench effects {grid} --out out --only {only}"))
         };
         let lines = || {
-            let text = std::fs::read_to_string(out.join("cells.jsonl")).unwrap();
-            text.lines()
-                .filter(|line| !line.is_empty())
-                .map(str::to_owned)
-                .collect::<Vec<_>>()
+            let text = scratch.read("out/cells.jsonl");
+            let whole = text.lines().filter(|line| !line.is_empty());
+            whole.map(str::to_owned).collect::<Vec<_>>()
         };
-        assert_eq!(run(&["none"])["cells"], 1);
+        assert_eq!(run("none")["cells"], 1);
         // An incomplete line is not a result, and is cut off.
         let first = lines();
-        std::fs::write(out.join("cells.jsonl"), format!("{}\n{{\"conf", first[0])).unwrap();
-        let summary = run(&["none", "coulomb"]);
+        scratch.file("out/cells.jsonl", format!("{}\n{{\"conf", first[0]));
+        let summary = run("none coulomb");
         assert_eq!((summary["cells"].as_u64(), lines().len()), (Some(2), 2));
         assert_eq!(lines()[0], first[0], "the first cell is not run again");
         let coulomb: serde_json::Value = serde_json::from_str(&lines()[1]).unwrap();
@@ -258,8 +240,7 @@ mod slow {
         let error = |which: &str| errors[which].as_f64().unwrap();
         // A model that includes the friction predicts far better than one that does not.
         assert!(error("message") < 0.2 * error("before"), "{errors}");
-        let table = std::fs::read_to_string(out.join("table.md")).unwrap();
-        assert!(table.contains("| one effect: exact |"), "{table}");
-        crate::support::clients::look_at(&out.join("report.html"));
+        says(&scratch.read("out/table.md"), &["| one effect: exact |"]);
+        crate::support::clients::look_at(&scratch.path("out/report.html"));
     }
 }

@@ -1,7 +1,6 @@
 //! The comparison on measured rigs: its file, and a small rig of simulated logs end to end.
 
 use std::env;
-use std::fs;
 
 use residyn::read_model;
 use residyn_core::closeloop::Settings;
@@ -13,9 +12,10 @@ use residyn_validation::rigs::{
 };
 use serde_json::Value;
 
-use crate::support::bench::{Bench, RIGS};
+use crate::support::bench::{COMMAND, RIGS, bench};
 use crate::support::paths::config;
-use crate::support::{refuses, residyn, succeeds};
+use crate::support::tables::rows;
+use crate::support::{Scratch, replaced, says};
 
 /// Error of a model in a row, 0.5 s ahead \[rad\].
 fn error(row: &Value, model: &str) -> f64 {
@@ -24,23 +24,23 @@ fn error(row: &Value, model: &str) -> f64 {
     entry["pooled"][1]["position_rms"].as_f64().unwrap()
 }
 
+/// The first rig of a bench.
+fn opened(bench: &Scratch) -> Measured {
+    let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
+    Measured::open(rig, bench.folder(), &Library::built_in()).unwrap()
+}
+
 #[test]
 fn results_of_other_logs_or_models_are_not_used_again() {
-    let bench = Bench::new(RIGS);
-    let fingerprint = || {
-        let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
-        let library = Library::built_in();
-        Measured::open(rig, bench.folder.path(), &library)
-            .unwrap()
-            .fingerprint
-    };
+    let bench = bench(RIGS);
+    let fingerprint = || opened(&bench).fingerprint;
     let first = fingerprint();
     assert_eq!(first, fingerprint());
-    let log = fs::read_to_string(bench.path("logs/log4.csv")).unwrap();
+    let log = bench.read("logs/log4.csv");
     let shorter = log.trim_end().rsplit_once('\n').unwrap().0;
-    fs::write(bench.path("logs/log4.csv"), shorter).unwrap();
+    bench.file("logs/log4.csv", shorter);
     let second = fingerprint();
-    fs::write(bench.path("rigs.toml"), RIGS.replace("5.0", "5.1")).unwrap();
+    bench.file("rigs.toml", RIGS.replace("5.0", "5.1"));
     assert!(first != second && second != fingerprint());
 }
 
@@ -65,92 +65,56 @@ fn the_rigs_of_the_repository_are_read() {
     }
 }
 
+/// A text of the file, what stands there instead, the line that is named, and words of the message.
+const WRONG: &str = r#"
+folder =                       | folders =  | 6  | unknown field `folders`, expected one of
+, "log2.csv", "log3.csv"]      | ]          | 9  | test by `halves`
+@7.5-8                         | @8-7.5     | 11 | an interval starts
+"#;
+
 #[test]
 fn a_wrong_file_of_rigs_is_refused_with_the_line_and_a_remedy() {
-    let place = |from: &str, to: &str| {
-        assert!(RIGS.contains(from));
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("rigs.toml");
-        fs::write(&path, RIGS.replace(from, to)).unwrap();
-        match read(&path).unwrap_err() {
-            RigsError::File { line, message, .. } => (line, message),
+    let scratch = Scratch::new();
+    let place = |rigs: String| {
+        scratch.file("rigs.toml", rigs);
+        match read(&scratch.path("rigs.toml")).unwrap_err() {
+            RigsError::File { line, message, .. } => (line.to_string(), message),
             other => panic!("{other}"),
         }
     };
-    let (line, message) = place("folder =", "folders =");
-    assert_eq!(line, 6, "{message}");
-    assert!(
-        message.contains("unknown field `folders`, expected one of"),
-        "{message}"
-    );
-    let (line, message) = place(", \"log2.csv\", \"log3.csv\"]", "]");
-    assert_eq!(
-        (line, message.contains("test by `halves`")),
-        (9, true),
-        "{message}"
-    );
-    let (line, message) = place("@7.5-8", "@8-7.5");
-    assert_eq!(
-        (line, message.contains("an interval starts")),
-        (11, true),
-        "{message}"
-    );
-    let (line, message) = place(RIGS, &format!("{RIGS}{}", RIGS.replace("plain =", "#")));
-    assert_eq!(
-        (line, message.contains("give another name")),
-        (17, true),
-        "{message}"
-    );
+    for [from, to, wanted, words] in rows(WRONG) {
+        let (line, message) = place(replaced(RIGS, &from, &to));
+        assert_eq!(line, wanted, "{message}");
+        says(&message, &[&words]);
+    }
+    let (line, message) = place(RIGS.to_owned() + &RIGS.replace("plain =", "#"));
+    assert_eq!(line, "17", "{message}");
+    says(&message, &["give another name"]);
 }
+
+/// A text of the file, what stands there instead, and words of the message.
+const LACKING: &str = r#"
+C_i = 5.0                      | J = 5.0        | rig: pendulum has no parameter `J`; it has C_g, C_i
+coulomb_friction               | coulomb        | unknown effect `coulomb`
+log2.csv@                      | log9.csv@      | no log is called "log9.csv"
+"logs"                         | "other"        | give the folder of measured logs with --data
+"log4.csv"                     | "log9.csv"     | log9.csv
+model = "pendulum"\nparameters | model = "pendulam"\nparameters | pendulam
+"#;
 
 #[test]
 fn what_the_models_and_logs_of_a_rig_lack_is_reported() {
-    for (from, to, part) in [
-        (
-            "C_i = 5.0",
-            "J = 5.0",
-            "rig: pendulum has no parameter `J`; it has C_g, C_i",
-        ),
-        ("coulomb_friction", "coulomb", "unknown effect `coulomb`"),
-        ("log2.csv@", "log9.csv@", "no log is called \"log9.csv\""),
-        (
-            "\"logs\"",
-            "\"other\"",
-            "give the folder of measured logs with --data",
-        ),
-        ("\"log4.csv\"", "\"log9.csv\"", "log9.csv"),
-        (
-            "model = \"pendulum\"\nparameters",
-            "model = \"pendulam\"\nparameters",
-            "pendulam",
-        ),
-    ] {
-        Bench::new(&RIGS.replace(from, to)).command(&[], |arguments| {
-            let message = refuses(arguments);
-            assert!(message.contains(part), "{to}: {message}");
-        });
+    for [from, to, words] in rows(LACKING) {
+        let bench = bench(&RIGS.replace(&from, &to));
+        says(&bench.refuses(COMMAND), &[&words]);
     }
-    let message = refuses(&[
-        "bench",
-        "rigs",
-        "--rigs",
-        "no-such-file.toml",
-        "--data",
-        ".",
-    ]);
-    assert!(
-        message.contains("give a file of rigs with --rigs"),
-        "{message}"
-    );
-    let message = refuses(&[
-        "bench",
-        "rigs",
-        "--data",
-        ".",
-        "--only",
-        "nothing-of-the-kind",
-    ]);
-    assert!(message.contains("no rig's name contains"), "{message}");
+    for [flags, words] in rows(
+        "--rigs no-such-file.toml --data .       | give a file of rigs with --rigs
+         --rigs $REPO/configs/bench/rigs.toml --data . --only nothing-of-the-kind | no rig's name contains",
+    ) {
+        let message = Scratch::new().refuses(&format!("bench rigs {flags}"));
+        says(&message, &[&words]);
+    }
 }
 
 mod slow {
@@ -158,10 +122,8 @@ mod slow {
 
     #[test]
     fn each_log_is_left_out_in_turn_and_the_errors_are_pooled() {
-        let bench = Bench::new(RIGS);
-        let library = Library::built_in();
-        let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
-        let rig = Measured::open(rig, bench.folder.path(), &library).unwrap();
+        let bench = bench(RIGS);
+        let (rig, library) = (opened(&bench), Library::built_in());
         let tools = Tools {
             library: &library,
             learner: None,
@@ -215,36 +177,34 @@ mod slow {
 
     #[test]
     fn halves_train_and_test_and_a_failed_fold_is_never_a_success() {
-        let bench = Bench::new(&RIGS.replace("each_log", "halves").replace("also", "#"));
-        bench.command(&["--json"], |arguments| {
-            let summary: Value = serde_json::from_str(&succeeds(arguments)).unwrap();
-            assert_eq!(summary["rows"].as_array().unwrap().len(), 1);
-            assert_eq!(summary["rows"][0]["folds"], 2);
-        });
-        let path = bench.path("out/rig/first half/closeloop.json");
-        let mut line: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+        let bench = bench(&RIGS.replace("each_log", "halves").replace("also", "#"));
+        let summary = bench.json(COMMAND);
+        assert_eq!(summary["rows"].as_array().unwrap().len(), 1);
+        assert_eq!(summary["rows"][0]["folds"], 2);
+        let path = "out/rig/first half/closeloop.json";
+        let mut line = bench.read_json(path);
         line["found"] = serde_json::json!({"Err": "the fit diverged"});
-        fs::write(&path, line.to_string()).unwrap();
+        bench.file(path, line.to_string());
         // Stored results are reused.
-        bench.command(&["--json"], |arguments| {
-            let output = residyn(arguments);
-            assert_eq!(output.status.code(), Some(1));
-            let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
-            assert_eq!(summary["failures"][0][2], "the fit diverged");
-            assert_eq!(summary["rows"][0]["ratio"], Value::Null);
-        });
-        let table = fs::read_to_string(bench.path("out/rigs.md")).unwrap();
-        assert!(table.contains("| 1 failed | 1 failed | - |"), "{table}");
+        let output = bench.run(&format!("{COMMAND} --json"));
+        assert_eq!(output.status.code(), Some(1));
+        let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(summary["failures"][0][2], "the fit diverged");
+        assert_eq!(summary["rows"][0]["ratio"], Value::Null);
+        says(
+            &bench.read("out/rigs.md"),
+            &[
+                "| 1 failed | 1 failed | - |",
+                "in 0, at most 0.9 of it in 0",
+            ],
+        );
         crate::support::clients::look_at(&bench.path("out/report.html"));
-        assert!(table.contains("in 0, at most 0.9 of it in 0"), "{table}");
     }
 
     #[test]
     fn mujoco_predicts_as_the_program_does_and_its_toolbox_finds_the_friction() {
-        let bench = Bench::new(RIGS);
-        let library = Library::built_in();
-        let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
-        let rig = Measured::open(rig, bench.folder.path(), &library).unwrap();
+        let bench = bench(RIGS);
+        let rig = opened(&bench);
         let (fold, (_, model)) = (&rig.folds[0], &rig.published[0]);
         let rms = |errors: &[LogErrors]| errors[0].iter().map(Squares::rms).collect::<Vec<f64>>();
         let task = Task::new(model, &[], &fold.test).unwrap();

@@ -7,9 +7,12 @@ use residyn::with_effects_in;
 use residyn::{Library, Model, rng};
 use residyn_core::data::Joint;
 use residyn_core::model::FittedEffect;
-use residyn_core::model::check::{Check, Finding, Kind, Severity};
+use residyn_core::model::check::{Check, Finding, Severity};
+use serde_json::Value;
 
-use crate::support::{refuses, residyn, succeeds, text};
+use crate::support::paths::ours;
+use crate::support::tables::rows;
+use crate::support::{Scratch, replaced, says, succeeds, text};
 
 fn check(file: &str) -> Check {
     let library = Library::built_in();
@@ -19,10 +22,8 @@ fn check(file: &str) -> Check {
 
 /// Every TOML file in a folder of the project that describes a system.
 fn shipped(folder: &str) -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
-    let files = fs::read_dir(&folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path());
+    let entries = fs::read_dir(ours(folder)).unwrap();
+    let files = entries.map(|entry| entry.unwrap().path());
     let is_model =
         |path: &PathBuf| path.is_file() && fs::read_to_string(path).unwrap().contains("[system]");
     files.filter(is_model).collect()
@@ -40,17 +41,15 @@ fn shipped_models_are_clean() {
 
 #[test]
 fn models_made_from_a_robot_description_are_clean() {
-    let folder = tempfile::tempdir().unwrap();
-    let mechanisms = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/mechanisms");
-    for (arm, from) in [
-        ("spatial_3r.urdf", "--from-urdf"),
-        ("planar_2r.urdf", "--from-urdf"),
-        ("prr.xml", "--from-mjcf"),
+    let scratch = Scratch::new();
+    for (arm, format) in [
+        ("spatial_3r.urdf", "urdf"),
+        ("planar_2r.urdf", "urdf"),
+        ("prr.xml", "mjcf"),
     ] {
-        let out = folder.path().join(format!("{arm}.toml"));
-        let mechanism = mechanisms.join(arm);
-        succeeds(&["new", from, text(&mechanism), "--out", text(&out)]);
-        succeeds(&["check", text(&out)]);
+        let file = format!("$REPO/tests/fixtures/mechanisms/{arm}");
+        scratch.succeeds(&format!("new --from-{format} {file} --out {arm}.toml"));
+        scratch.succeeds(&format!("check {arm}.toml"));
     }
 }
 
@@ -65,134 +64,38 @@ fn the_units_of_all_effects_fit() {
     }
 }
 
-/// A built-in model with one text replaced by another, and the resulting finding: kind, line, and words.
-const BROKEN: &[(&str, [&str; 2], Kind, usize, &str)] = &[
-    (
-        "acrobot",
-        ["g = {", "h = { value = 1.0 }\ng = {"],
-        Kind::Unused,
-        14,
-        "no equation uses `h`",
-    ),
-    (
-        "acrobot",
-        ["S2 =", "half = \"0.5*d1\"\nS2 ="],
-        Kind::Unused,
-        19,
-        "no equation uses `half`",
-    ),
-    (
-        "drive",
-        ["\"m\"", "\"1\""],
-        Kind::Unused,
-        8,
-        "only [energy] uses `m`",
-    ),
-    (
-        "pendulum",
-        ["+ C_i * tau1", ""],
-        Kind::Input,
-        11,
-        "no acceleration uses `tau1`",
-    ),
-    (
-        "servo",
-        ["(cmd1 - q1)", "(-q1)"],
-        Kind::Input,
-        14,
-        "no formula of [drive] uses `cmd1`",
-    ),
-    (
-        "acrobot",
-        ["[\"d2\", \"m2", "[\"d1\", \"m2"],
-        Kind::Mass,
-        23,
-        "is not symmetric",
-    ),
-    (
-        "acrobot",
-        ["\"m2*lc2^2 + I2\"]", "\"m2*lc2^2 - I2\"]"],
-        Kind::Mass,
-        23,
-        "is not positive definite: its smallest eigenvalue is -",
-    ),
-    (
-        "acrobot",
-        ["[\"d2\", \"m2*lc2^2 + I2\"]", "[\"d2\", \"d2^2/d1\"]"],
-        Kind::Mass,
-        23,
-        "is singular: its smallest eigenvalue is",
-    ),
-    (
-        "acrobot",
-        ["\"m2*lc2^2 + I2\"]", "\"I2/(q1 + q2)\"]"],
-        Kind::Mass,
-        23,
-        "has an entry that is not a number, at q1 = 0.0000, q2 = 0.0000",
-    ),
-    (
-        "acrobot",
-        ["(qd2 + 2*qd1)", "(qd2 - 2*qd1)"],
-        Kind::Power,
-        24,
-        "the velocity-product terms of `bias` take ",
-    ),
-    (
-        "acrobot",
-        ["m1*lc1^2 +", "m1*lc1 +"],
-        Kind::Units,
-        17,
-        "`m1*lc1` [kg m] and `m2*(l1^2",
-    ),
-    (
-        "servo",
-        ["G*sin(q1)\"]", "G*sin(q1)/kd\"]"],
-        Kind::Units,
-        18,
-        "entry 1 of `bias` is `G*sin(q1)/kd` [1/s], but should be in [N m]",
-    ),
-    (
-        "pendulum",
-        ["\"1/(kg m^2)\"", "\"1/kg\""],
-        Kind::Units,
-        11,
-        "`C_g * sin(q1)` [1/s^2] and `C_i * tau1` [m^2/s^2] cannot be added or compared",
-    ),
-    (
-        "drive",
-        ["\"kg\"", "\"lb\""],
-        Kind::Units,
-        8,
-        "the unit `lb` of `m` is not",
-    ),
-    (
-        "drive",
-        ["[dynamics]", "sign = { value = 1.0 }\n[dynamics]"],
-        Kind::Name,
-        10,
-        "`sign` is also a function",
-    ),
-    (
-        "drive",
-        ["[dynamics]", "tau2 = { value = 1.0 }\n[dynamics]"],
-        Kind::Name,
-        10,
-        "`tau2` reads like a quantity of a joint",
-    ),
-];
+/// A built-in model, one of its texts, what stands there instead, and the finding: kind, line, and words.
+const BROKEN: &str = r#"
+acrobot  | g = {             | h = { value = 1.0 }\ng = {          | Unused | 14 | no equation uses `h`
+acrobot  | S2 =              | half = "0.5*d1"\nS2 =              | Unused | 19 | no equation uses `half`
+drive    | "m"               | "1"                                | Unused | 8  | only [energy] uses `m`
+pendulum | + C_i * tau1      |                                    | Input  | 11 | no acceleration uses `tau1`
+servo    | (cmd1 - q1)       | (-q1)                              | Input  | 14 | no formula of [drive] uses `cmd1`
+acrobot  | ["d2", "m2        | ["d1", "m2                         | Mass   | 23 | is not symmetric
+acrobot  | "m2*lc2^2 + I2"]  | "m2*lc2^2 - I2"]                   | Mass   | 23 | is not positive definite: its smallest eigenvalue is -
+acrobot  | ["d2", "m2*lc2^2 + I2"] | ["d2", "d2^2/d1"]            | Mass   | 23 | is singular: its smallest eigenvalue is
+acrobot  | "m2*lc2^2 + I2"]  | "I2/(q1 + q2)"]                    | Mass   | 23 | has an entry that is not a number, at q1 = 0.0000, q2 = 0.0000
+acrobot  | (qd2 + 2*qd1)     | (qd2 - 2*qd1)                      | Power  | 24 | the velocity-product terms of `bias` take
+acrobot  | m1*lc1^2 +        | m1*lc1 +                           | Units  | 17 | `m1*lc1` [kg m] and `m2*(l1^2
+servo    | G*sin(q1)"]       | G*sin(q1)/kd"]                     | Units  | 18 | entry 1 of `bias` is `G*sin(q1)/kd` [1/s], but should be in [N m]
+pendulum | "1/(kg m^2)"      | "1/kg"                             | Units  | 11 | `C_g * sin(q1)` [1/s^2] and `C_i * tau1` [m^2/s^2] cannot be added or compared
+drive    | "kg"              | "lb"                               | Units  | 8  | the unit `lb` of `m` is not
+drive    | [dynamics]        | sign = { value = 1.0 }\n[dynamics] | Name   | 10 | `sign` is also a function
+drive    | [dynamics]        | tau2 = { value = 1.0 }\n[dynamics] | Name   | 10 | `tau2` reads like a quantity of a joint
+"#;
 
 #[test]
 fn what_is_broken_is_found_with_its_line() {
-    for (model, [from, to], kind, line, words) in BROKEN {
-        let file = Library::system_text(model).unwrap();
-        assert!(file.contains(from), "{from}");
-        let found = check(&file.replacen(from, to, 1)).findings;
-        let is_it = |finding: &&Finding| finding.kind == *kind && finding.text.contains(words);
-        let finding = found.iter().find(is_it);
+    for [model, from, to, kind, line, words] in rows(BROKEN) {
+        let file = Library::system_text(&model).unwrap();
+        let found = check(&replaced(file, &from, &to)).findings;
+        let is_kind = |finding: &Finding| format!("{:?}", finding.kind) == kind;
+        let mut of_kind = found.iter().filter(|finding| is_kind(finding));
+        let finding = of_kind.find(|finding| finding.text.contains(&words));
         let finding = finding.unwrap_or_else(|| panic!("{words}: {found:?}"));
-        assert_eq!(finding.line, Some(*line), "{finding:?}");
+        assert_eq!(finding.line, Some(line.parse().unwrap()), "{finding:?}");
         let is_error = finding.severity == Severity::Error;
-        assert_eq!(is_error, *kind == Kind::Mass, "{finding:?}");
+        assert_eq!(is_error, kind == "Mass", "{finding:?}");
     }
 }
 
@@ -221,29 +124,24 @@ fn parameters_of_effects_are_looked_at() {
 
 #[test]
 fn the_exit_status_says_whether_something_was_found() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("rig.toml");
+    let scratch = Scratch::new();
     let drive = Library::system_text("drive").unwrap();
-    fs::write(&file, drive.replace("\"kg\"", "\"lb\"")).unwrap();
-    let output = residyn(&["check", "pendulum", text(&file)]);
-    assert_eq!(output.status.code(), Some(1));
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert!(
-        said.lines().all(|line| line.chars().count() <= 80),
-        "{said}"
-    );
-    assert!(said.contains("warning  line 8: the unit `lb`"), "{said}");
-    let output = residyn(&["check", "--json", text(&file)]);
-    assert_eq!(output.status.code(), Some(1));
-    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(value[0]["model"], text(&file));
+    scratch.file("rig.toml", drive.replace("\"kg\"", "\"lb\""));
+    let found = |line: &str| {
+        let output = scratch.run(line);
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let said = found("check pendulum rig.toml");
+    let is_narrow = said.lines().all(|line| line.chars().count() <= 80);
+    assert!(is_narrow, "{said}");
+    says(&said, &["warning  line 8: the unit `lb`"]);
+    let value: Value = serde_json::from_str(&found("check --json rig.toml")).unwrap();
+    assert_eq!(value[0]["model"], "rig.toml");
     let finding = &value[0]["findings"][0];
     assert_eq!(finding["kind"], "units");
     assert_eq!(finding["severity"], "warning");
-    fs::write(&file, drive.replace("value = 1.0", "value = -1.0")).unwrap();
-    let said = refuses(&["check", text(&file)]);
-    assert!(
-        said.contains("rig.toml, line 8") && said.contains("outside its bounds"),
-        "{said}"
-    );
+    scratch.file("rig.toml", drive.replace("value = 1.0", "value = -1.0"));
+    let said = scratch.refuses("check rig.toml");
+    says(&said, &["rig.toml, line 8", "outside its bounds"]);
 }

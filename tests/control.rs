@@ -13,13 +13,10 @@ use residyn_train::recipe::{Job, Recipe};
 use residyn_train::{Backend, Checkpoint};
 use serde_json::Value;
 
-use crate::support::in_folder::{json, kill_after, refused, residyn};
-use crate::support::paths::{config, configs};
-
-fn shipped(name: &str) -> String {
-    let checkpoints = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints");
-    checkpoints.join(name).display().to_string()
-}
+use crate::support::in_folder::{json, kill_after, refused};
+use crate::support::paths::{config, configs, ours};
+use crate::support::tables::{rows, says_words};
+use crate::support::{Scratch, says};
 
 #[test]
 fn a_model_swings_up_its_own_plant_and_the_episode_is_written() {
@@ -65,22 +62,13 @@ fn a_model_swings_up_its_own_plant_and_the_episode_is_written() {
 
 #[test]
 fn options_change_the_plant() {
-    let dir = tempfile::tempdir().unwrap();
-    let command = [
-        "control",
-        "--model",
-        "pendulum",
-        "--plant",
-        "pendulum-real",
-        "--out",
-        "e",
-    ];
-    let options = [
-        "--start", "0.1", "-0.2", "--torque", "2", "--replan", "5", "--noise", "0.01", "0.1",
-    ];
-    let found = json(dir.path(), &[command.as_slice(), &options].concat());
+    let scratch = Scratch::new();
+    let options = "--start 0.1 -0.2 --torque 2 --replan 5 --noise 0.01 0.1";
+    let line = "control --model pendulum --plant pendulum-real --out e";
+    let found = scratch.json(&format!("{line} {options}"));
     assert_eq!(found["episodes"][0]["decisions"], 100);
-    let log = read_rig_log(dir.path().join("e/episode-000.csv"), 1, &Columns::default()).unwrap();
+    let log = scratch.path("e/episode-000.csv");
+    let log = read_rig_log(log, 1, &Columns::default()).unwrap();
     let start = [log.q[0][0] - 0.1, log.qd[0][0] + 0.2];
     assert!(
         start[0] != 0.0 && start[0].abs() < 0.05 && start[1].abs() < 0.5,
@@ -91,64 +79,29 @@ fn options_change_the_plant() {
     assert_eq!(found["episodes"][0]["success"], true, "{found}");
 }
 
+/// Flags of `residyn control`, and words of the message.
+const REFUSED: &str = "
+--model acrobot --plant pendulum-real               | the model acrobot has 2 joints, but the plant pendulum has 1
+--model cartpole --plant cartpole                   | no built-in task is for cartpole; give a task file
+--model pendulum --plant pendulum-real --replan 81  | `replan` is 81, but a plan has 80 steps
+--model pendulum --plant pendulum --task t.toml     | t.toml: ... line 2 ... reward
+";
+
 #[test]
 fn control_refuses_other_systems_tasks_and_settings() {
-    let dir = tempfile::tempdir().unwrap();
-    let message = |arguments: &[&str]| refused(dir.path(), &[&["control"], arguments].concat());
-    let other = message(&["--model", "acrobot", "--plant", "pendulum-real"]);
-    assert!(
-        other.contains("the model acrobot has 2 joints, but the plant pendulum has 1"),
-        "{other}"
-    );
-    let none = message(&["--model", "cartpole", "--plant", "cartpole"]);
-    assert!(
-        none.contains("no built-in task is for cartpole; give a task file"),
-        "{none}"
-    );
-    let far = message(&[
-        "--model",
-        "pendulum",
-        "--plant",
-        "pendulum-real",
-        "--replan",
-        "81",
-    ]);
-    assert!(
-        far.contains("`replan` is 81, but a plan has 80 steps"),
-        "{far}"
-    );
-    fs::write(
-        dir.path().join("t.toml"),
-        "system = \"pendulum\"\nreward = 1\n",
-    )
-    .unwrap();
-    let key = message(&[
-        "--model", "pendulum", "--plant", "pendulum", "--task", "t.toml",
-    ]);
-    assert!(
-        key.contains("t.toml: ") && key.contains("line 2") && key.contains("reward"),
-        "{key}"
-    );
-    assert_eq!(
-        fs::read_dir(dir.path()).unwrap().count(),
-        1,
-        "nothing is written"
-    );
+    let scratch = Scratch::new();
+    scratch.file("t.toml", "system = \"pendulum\"\nreward = 1\n");
+    for [flags, words] in rows(REFUSED) {
+        says_words(&scratch.refuses(&format!("control {flags}")), &words);
+    }
+    assert_eq!(scratch.count(), 1, "nothing is written");
 }
 
-/// The command line of an experiment.
-fn experiment<'a>(name: &'a str, config: &'a str, out: &'a str) -> [&'a str; 6] {
-    ["experiment", name, "--config", config, "--out", out]
-}
-
-/// The error of a recipe's run on other data, and the resulting model.
-fn trained_again(recipe: &str) -> (f64, tempfile::TempDir) {
-    let dir = tempfile::tempdir().unwrap();
-    let found = json(
-        dir.path(),
-        &["train", "--config", &config(recipe), "--out", "c"],
-    );
-    (found["test_error"]["after"].as_f64().unwrap(), dir)
+/// The error of a recipe's run on other data.
+fn trained_again(recipe: &str) -> f64 {
+    let line = format!("train --config $REPO/configs/{recipe} --out c");
+    let found = Scratch::new().json(&line);
+    found["test_error"]["after"].as_f64().unwrap()
 }
 
 /// A checkpoint's error on the same data.
@@ -170,9 +123,9 @@ fn job_dynamics(job: &Job) -> residyn_core::model::Dynamics {
 /// Rounding differs between processors and grows over thousands of epochs, so the model's accuracy must be reproducible
 /// everywhere; on the machine that made it, the model is reproducible bit for bit.
 fn comes_again(name: &str, recipe: &str, most: f64) {
-    let checkpoint = Checkpoint::load(Path::new(&shipped(name))).unwrap();
+    let checkpoint = Checkpoint::load(&ours("checkpoints").join(name)).unwrap();
     let shipped = error_of(&checkpoint, recipe);
-    let (again, _) = trained_again(recipe);
+    let again = trained_again(recipe);
     assert!(shipped < most, "{name}: {shipped:e}");
     let ratio = again / shipped;
     assert!(
@@ -186,17 +139,8 @@ fn comes_again(name: &str, recipe: &str, most: f64) {
 
 /// The smaller return of two episodes with a shipped checkpoint on the plant that it was trained on.
 fn least_return(name: &str) -> f64 {
-    let dir = tempfile::tempdir().unwrap();
-    let command = [
-        "control",
-        "--checkpoint",
-        &shipped(name),
-        "--plant",
-        name,
-        "--episodes",
-        "2",
-    ];
-    let found = json(dir.path(), &command);
+    let given = format!("--checkpoint $REPO/checkpoints/{name} --plant {name}");
+    let found = Scratch::new().json(&format!("control {given} --episodes 2"));
     let episodes = found["episodes"].as_array().unwrap().iter();
     episodes
         .map(|e| e["return"].as_f64().unwrap())
@@ -205,11 +149,18 @@ fn least_return(name: &str) -> f64 {
 
 #[test]
 fn every_experiment_is_sound() {
-    let library = Library::built_in();
+    let (library, scratch) = (Library::built_in(), Scratch::new());
     let mut count = 0;
     for name in ["physics-prior", "offline-prior", "receding-horizon"] {
         for entry in fs::read_dir(configs().join(name)).unwrap() {
-            let config = Config::read(&entry.unwrap().path()).unwrap();
+            let mut path = entry.unwrap().path();
+            if name != "offline-prior" {
+                // Read from another folder: what it names is built in. Other priors are files of the project.
+                let copy = scratch.path("experiment.toml");
+                fs::copy(&path, &copy).unwrap();
+                path = copy;
+            }
+            let config = Config::read(&path).unwrap();
             assert!(config.seeds >= 10, "{}", config.path.display());
             assert!(
                 Session::open(config, &library, Backend::NdArray, 0)
@@ -225,57 +176,38 @@ fn every_experiment_is_sound() {
 
 #[test]
 fn a_folder_of_another_experiment_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
+    let scratch = Scratch::new();
     let text = fs::read_to_string(configs().join("smoke/receding-horizon-pendulum.toml")).unwrap();
-    fs::write(dir.path().join("c.toml"), &text).unwrap();
-    let command = experiment("receding-horizon", "c.toml", "x");
-    let found = json(dir.path(), &command);
+    scratch.file("c.toml", &text);
+    let line = "experiment receding-horizon --config c.toml --out x";
+    let found = scratch.json(line);
     assert_eq!(found["receding_horizon"], serde_json::json!([25, 50]));
-    assert_eq!(
-        found["methods"]["perfect"]["return_mean"]
-            .as_array()
-            .unwrap()
-            .len(),
-        2
-    );
-    fs::write(
-        dir.path().join("c.toml"),
-        text.replace("epochs = 300", "epochs = 301"),
-    )
-    .unwrap();
-    let message = refused(dir.path(), &command);
-    assert!(
-        message.contains("x holds another run: ") && message.contains("epochs"),
-        "{message}"
-    );
-    fs::write(
-        dir.path().join("c.toml"),
-        text.replace("gather = 50", "gather = 70"),
-    )
-    .unwrap();
-    let message = refused(dir.path(), &command);
-    assert!(
-        message.contains("c.toml: `gather` is 70, but an episode of pendulum has 500 steps"),
-        "{message}"
-    );
+    let returns = &found["methods"]["perfect"]["return_mean"];
+    assert_eq!(returns.as_array().unwrap().len(), 2);
+    for [from, to, words] in rows(
+        "epochs = 300 | epochs = 301 | x holds another run:  ... epochs
+         gather = 50  | gather = 70  | c.toml: `gather` is 70, but an episode of pendulum has 500 steps",
+    ) {
+        scratch.file("c.toml", text.replace(&from, &to));
+        says_words(&scratch.refuses(line), &words);
+    }
 }
 
 #[test]
 fn a_checkpoint_serves_as_prior_in_its_own_experiment_alone() {
-    let dir = tempfile::tempdir().unwrap();
-    let config = config("smoke/offline-prior-pendulum.toml");
-    let found = json(dir.path(), &experiment("offline-prior", &config, "x"));
-    let prior = found["methods"]["prior"]["return_mean"][0]
-        .as_f64()
-        .unwrap();
-    let perfect = found["methods"]["perfect"]["return_mean"][0]
-        .as_f64()
-        .unwrap();
+    let scratch = Scratch::new();
+    let config = "--config $REPO/configs/smoke/offline-prior-pendulum.toml";
+    let found = scratch.json(&format!("experiment offline-prior {config} --out x"));
+    let of = |method: &str| {
+        let returns = &found["methods"][method]["return_mean"];
+        returns[0].as_f64().unwrap()
+    };
+    let (prior, perfect) = (of("prior"), of("perfect"));
     assert!(prior < 0.0 && perfect > 290.0, "{prior} {perfect}");
-    let wrong = refused(dir.path(), &experiment("physics-prior", &config, "y"));
-    assert!(
-        wrong.contains("physics-prior needs a method whose prior is equations"),
-        "{wrong}"
+    let wrong = scratch.refuses(&format!("experiment physics-prior {config} --out y"));
+    says(
+        &wrong,
+        &["physics-prior needs a method whose prior is equations"],
     );
 }
 
@@ -296,15 +228,15 @@ mod slow {
 
     #[test]
     fn a_killed_experiment_resumes_to_the_same_numbers() {
-        let config = config("smoke/physics-prior-pendulum.toml");
-        let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let command = experiment("physics-prior", &config, "x");
-        let expected = json(whole.path(), &command);
+        let config = "--config $REPO/configs/smoke/physics-prior-pendulum.toml";
+        let line = format!("experiment physics-prior {config} --out x");
+        let [whole, killed] = [(); 2].map(|()| Scratch::new());
+        let expected = whole.json(&line);
         for file in ["hybrid-00/rounds.jsonl", "data_driven-00/rounds.jsonl"] {
-            let file = killed.path().join("x/runs").join(file);
-            kill_after(&mut residyn(killed.path(), &command), &file, Duration::ZERO);
+            let file = killed.path("x/runs").join(file);
+            kill_after(&mut killed.command(&line), &file, Duration::ZERO);
         }
-        let found = json(killed.path(), &command);
+        let found = killed.json(&line);
         assert_eq!(found["methods"], expected["methods"]);
         assert_eq!(found["reached"], expected["reached"]);
         for name in ["prior", "data_driven", "hybrid", "perfect"] {
@@ -327,24 +259,15 @@ mod slow {
             serde_json::json!([50, 100, 150, 200])
         );
         assert!(found["wall_s"].as_f64().unwrap() > 0.0);
-        let command_told = found["command"].as_str().unwrap();
-        assert!(
-            command_told.starts_with("residyn experiment physics-prior --config "),
-            "{command_told}"
-        );
-        let written: Value =
-            serde_json::from_slice(&fs::read(killed.path().join("x/results.json")).unwrap())
-                .unwrap();
-        assert_eq!(written, found);
-        assert!(killed.path().join("x/results.svg").is_file());
-        crate::support::clients::look_at(&killed.path().join("x/report.html"));
-        let stretch = killed.path().join("x/runs/hybrid-01/stretch-003.csv");
-        assert_eq!(
-            read_rig_log(&stretch, 1, &Columns::default())
-                .unwrap()
-                .rows(),
-            51
-        );
+        let command = found["command"].as_str().unwrap();
+        let begins = "residyn experiment physics-prior --config ";
+        assert!(command.starts_with(begins), "{command}");
+        assert_eq!(killed.read_json("x/results.json"), found);
+        assert!(killed.path("x/results.svg").is_file());
+        crate::support::clients::look_at(&killed.path("x/report.html"));
+        let stretch = killed.path("x/runs/hybrid-01/stretch-003.csv");
+        let stretch = read_rig_log(&stretch, 1, &Columns::default()).unwrap();
+        assert_eq!(stretch.rows(), 51);
     }
 
     #[test]

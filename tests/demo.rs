@@ -4,19 +4,19 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::support::{evaluated, refuses, residyn, succeeds, text};
+use crate::support::reports::{error, names};
+use crate::support::{Scratch, says};
 
-fn demo(seed: &str) -> (Value, tempfile::TempDir) {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("report");
-    let json = succeeds(&["closeloop", "--json", "--seed", seed, "--out", text(&out)]);
-    (serde_json::from_str(&json).unwrap(), folder)
+fn demo(seed: u32) -> (Value, Scratch) {
+    let scratch = Scratch::new();
+    let report = scratch.json(&format!("closeloop --seed {seed} --out report"));
+    (report, scratch)
 }
 
 /// The demo's report of seed 0, made once for all tests of this file.
 fn first_report() -> &'static Value {
     static REPORT: OnceLock<Value> = OnceLock::new();
-    REPORT.get_or_init(|| demo("0").0)
+    REPORT.get_or_init(|| demo(0).0)
 }
 
 /// A report without the time and the command that made it.
@@ -95,15 +95,8 @@ fn the_pendulum_is_drawn_at_its_logged_angles() {
 }
 
 #[test]
-fn a_calibration_of_no_runs_is_refused() {
-    let message = refuses(&["closeloop", "--calibrate", "0"]);
-    assert!(message.contains("--calibrate"), "{message}");
-}
-
-#[test]
 fn other_commands_read_the_written_files() {
-    let (report, folder) = demo("4");
-    let out = folder.path().join("report");
+    let (report, scratch) = demo(4);
     for file in [
         "report.json",
         "report.md",
@@ -112,63 +105,35 @@ fn other_commands_read_the_written_files() {
         "residual.svg",
         "errors.svg",
     ] {
-        assert!(out.join(file).is_file(), "{file}");
+        assert!(scratch.path("report").join(file).is_file(), "{file}");
     }
-    let log = folder.path().join("new.csv");
-    let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/demo.toml");
-    succeeds(&[
-        "simulate",
-        "--plant",
-        plant,
-        "--seed",
-        "9",
-        "--out",
-        text(&log),
-    ]);
-    let error = |model: &[&str]| evaluated(model, text(&log));
-    let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
-    let fitted = error(&["--model", text(&model)]);
+    scratch.simulates("$REPO/configs/demo.toml", &[9]);
+    let fitted = scratch.evaluated("--model report/model.toml --test run9.csv");
     assert!(fitted < 0.01, "{fitted}");
-    let hybrid = error(&["--checkpoint", text(&checkpoint)]);
+    let hybrid = scratch.evaluated("--checkpoint report/checkpoint --test run9.csv");
     assert!((hybrid - fitted).abs() < 0.2 * fitted, "{hybrid} {fitted}");
     // The written model, closed again, lacks no effect.
-    let again = folder.path().join("again");
-    let json = succeeds(&[
-        "closeloop",
-        "--json",
-        "--model",
-        text(&model),
-        "--train",
-        text(&log),
-        "--out",
-        text(&again),
-    ]);
-    let again: Value = serde_json::from_str(&json).unwrap();
+    let given = "--model report/model.toml --train run9.csv";
+    let again = scratch.json(&format!("closeloop {given} --out again"));
     assert_eq!(again["verdict"], "no_missing_effect");
     assert_eq!(report["files"]["checkpoint"], "checkpoint");
 }
 
 #[test]
 fn a_checkpoint_of_another_model_is_refused() {
-    let (_report, folder) = demo("5");
-    let checkpoint = folder.path().join("report/checkpoint");
+    let (_, scratch) = demo(5);
     let refused_on_log_of = |plant: &str| {
-        let log = folder.path().join(plant).with_extension("csv");
-        let simulate = ["simulate", "--plant", plant, "--out", text(&log)];
-        succeeds(&[&simulate[..], &["--duration", "2"]].concat());
-        let evaluate = ["evaluate", "--checkpoint", text(&checkpoint)];
-        refuses(&[&evaluate[..], &["--test", text(&log)]].concat())
+        let simulate = format!("simulate --plant {plant} --duration 2");
+        scratch.succeeds(&format!("{simulate} --out {plant}.csv"));
+        scratch.refuses(&format!(
+            "evaluate --checkpoint report/checkpoint --test {plant}.csv"
+        ))
     };
-    let message = refused_on_log_of("acrobot");
-    assert!(message.contains("joint"), "{message}");
+    says(&refused_on_log_of("acrobot"), &["joint"]);
     // A checkpoint whose weights do not belong to its model file.
     let model = include_str!("../models/drive.toml");
-    std::fs::write(checkpoint.join("model.toml"), model).unwrap();
-    let message = refused_on_log_of("pendulum");
-    assert!(
-        message.contains("pendulum") && message.contains("drive"),
-        "{message}"
-    );
+    scratch.file("report/checkpoint/model.toml", model);
+    says(&refused_on_log_of("pendulum"), &["pendulum", "drive"]);
 }
 
 mod slow {
@@ -176,48 +141,34 @@ mod slow {
 
     #[test]
     fn the_demo_names_the_hidden_effect_with_its_size() {
-        for seed in ["0", "1", "2"] {
-            let (report, _folder) = demo(seed);
+        for seed in 0..3 {
+            let (report, _) = demo(seed);
             assert_eq!(report["verdict"], "explained", "seed {seed}");
-            let effects = report["effects"].as_array().unwrap();
-            assert_eq!(effects.len(), 1, "seed {seed}: {effects:?}");
-            assert_eq!(effects[0]["name"], "coulomb_friction");
-            assert_eq!(effects[0]["expression"], "-F_c1 * sign(qd1)");
-            let parameter = &effects[0]["parameters"][0];
-            let value = parameter["value"].as_f64().unwrap();
+            assert_eq!(names(&report), ["coulomb_friction"], "seed {seed}");
+            let effect = &report["effects"][0];
+            assert_eq!(effect["expression"], "-F_c1 * sign(qd1)");
+            let value = effect["parameters"][0]["value"].as_f64().unwrap();
             assert!(
                 (value - TRUE_F_C).abs() < 0.01 * TRUE_F_C,
                 "seed {seed}: {value}"
             );
-            let rmse = |model: &str| {
-                report["error"][model]["position_rmse"][1][0]
-                    .as_f64()
-                    .unwrap()
-            };
-            assert!(rmse("after") <= 0.25 * rmse("before"), "seed {seed}");
+            let [before, after] = ["before", "after"].map(|model| error(&report, model));
+            assert!(after <= 0.25 * before, "seed {seed}");
         }
     }
 
     #[test]
     fn the_same_seed_gives_the_same_report() {
-        let [(first, _a), (second, _b)] = ["3", "3"].map(demo);
+        let [(first, _), (second, _)] = [3, 3].map(demo);
         assert_eq!(without_call(first), without_call(second));
     }
 
     #[test]
     fn a_search_whose_time_is_spent_stops_and_says_so() {
-        let folder = tempfile::tempdir().unwrap();
+        let scratch = Scratch::new();
         let closed = |budget: &str| -> Value {
-            let out = folder.path().join(budget);
-            let json = residyn(&[
-                "closeloop",
-                "--json",
-                "--budget",
-                budget,
-                "--out",
-                text(&out),
-            ]);
-            serde_json::from_slice(&json.stdout).unwrap()
+            let line = format!("closeloop --json --budget {budget} --out {budget}");
+            serde_json::from_slice(&scratch.run(&line).stdout).unwrap()
         };
         let report = closed("1us");
         assert_eq!(
@@ -231,44 +182,29 @@ mod slow {
             (&report["stopped"], &report["verdict"]),
             (&false.into(), &"explained".into())
         );
-        let timings = std::fs::read(folder.path().join("5min/timings.json")).unwrap();
-        let timings: Value = serde_json::from_slice(&timings).unwrap();
+        let timings = scratch.read_json("5min/timings.json");
         let stages: Vec<&Value> = (timings.as_array().unwrap().iter())
             .map(|t| &t["stage"])
             .collect();
         assert!(stages.len() >= 7 && stages[0] == "audit", "{timings}");
-        let error = refuses(&["closeloop", "--budget", "soon"]);
-        assert!(error.contains("--budget <TIME>"), "{error}");
+        let error = scratch.refuses("closeloop --budget soon");
+        says(&error, &["--budget <TIME>"]);
     }
 
     #[test]
     fn calibration_reports_false_alarms_and_detection_limits() {
-        let folder = tempfile::tempdir().unwrap();
-        let calibrated = |seed: &str, name: &str| {
-            let out = folder.path().join(name);
-            let out = text(&out);
-            let arguments = [
-                "closeloop",
-                "--json",
-                "--seed",
-                seed,
-                "--calibrate",
-                "2",
-                "--out",
-                out,
-            ];
-            let report: Value = serde_json::from_str(&succeeds(&arguments)).unwrap();
+        let calibrated = || {
+            let scratch = Scratch::new();
+            let report = scratch.json("closeloop --seed 3 --calibrate 2 --out report");
             for (file, heading) in [
                 ("report.md", "## What these logs could show"),
                 ("report.html", "<h3>What these logs could show</h3>"),
             ] {
-                let written = std::fs::read_to_string(folder.path().join(name).join(file)).unwrap();
-                assert!(written.contains(heading), "{file}");
+                says(&scratch.read(&format!("report/{file}")), &[heading]);
             }
-            report
+            without_call(report)
         };
-        let (first, second) = (calibrated("3", "first"), calibrated("3", "second"));
-        let [first, second] = [first, second].map(without_call);
+        let [first, second] = [calibrated(), calibrated()];
         assert_eq!(first, second);
         let calibration = &first["calibration"];
         assert_eq!(
@@ -283,7 +219,7 @@ mod slow {
         assert!(drag["value"].as_f64().unwrap() > 0.0);
         assert_eq!(drag["verified"], true);
         // The rest of the report is the same as without calibration.
-        let (plain, _folder) = demo("3");
+        let (plain, _) = demo(3);
         assert!(plain["calibration"].is_null());
         assert_eq!(plain["error"], first["error"]);
     }

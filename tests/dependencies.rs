@@ -9,6 +9,8 @@ use std::process::Command;
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::support::paths::ours;
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Record {
@@ -40,12 +42,8 @@ impl Reasons {
     }
 }
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
 fn record() -> Record {
-    let path = root().join("docs/dependencies.toml");
+    let path = ours("docs/dependencies.toml");
     toml::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
@@ -67,7 +65,11 @@ impl Workspace {
             "--format-version=1",
         ];
         let mut cargo = Command::new(env!("CARGO"));
-        let output = cargo.args(arguments).current_dir(root()).output().unwrap();
+        let output = cargo
+            .args(arguments)
+            .current_dir(ours(""))
+            .output()
+            .unwrap();
         let errors = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "cargo metadata:\n{errors}");
         Self(serde_json::from_slice(&output.stdout).unwrap())
@@ -232,7 +234,7 @@ fn every_crate_that_a_manifest_names_has_a_true_row() {
 
 #[test]
 fn every_python_package_that_the_wheel_names_has_a_row() {
-    let path = root().join("python/pyproject.toml");
+    let path = ours("python/pyproject.toml");
     let project: toml::Table = fs::read_to_string(path).unwrap().parse().unwrap();
     let lists = [
         &project["build-system"]["requires"],

@@ -1,6 +1,5 @@
 //! Rigs driven by commands: servos with position targets, motors under voltage.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use residyn::read_model;
@@ -13,7 +12,9 @@ use serde_json::Value;
 
 use crate::support::catalogue::{assert_near, points};
 use crate::support::clients::client;
-use crate::support::{mechanisms, refuses, succeeds, text};
+use crate::support::reports::estimate;
+use crate::support::tables::{rows, says_words};
+use crate::support::{Scratch, mechanisms, says};
 
 /// A pendulum arm on two position servos, as drawn or as built. Friction there stiffens within half a millisecond: by
 /// default MuJoCo's acts some ten milliseconds ahead of the velocity.
@@ -48,41 +49,25 @@ fn found(report: &Value, name: &str, joint: u64) -> Option<[f64; 3]> {
     estimate(&effect["parameters"][0])
 }
 
-fn estimate(parameter: &Value) -> Option<[f64; 3]> {
-    let ends = parameter["ci95"].as_array()?;
-    Some([
-        parameter["value"].as_f64()?,
-        ends[0].as_f64()?,
-        ends[1].as_f64()?,
-    ])
-}
-
 /// Whether a value is correct within twice its interval.
 fn holds([value, low, high]: [f64; 3], truth: f64) -> bool {
     (value - truth).abs() <= high - low
 }
 
-fn close_the_loop(model: &Path, train: &[PathBuf], test: &Path, out: &Path) -> Value {
-    let mut arguments = vec!["closeloop", "--json", "--model", text(model), "--train"];
-    arguments.extend(train.iter().map(|log| text(log)));
-    arguments.extend(["--test", text(test), "--out", text(out)]);
-    serde_json::from_str(&succeeds(&arguments)).unwrap()
-}
+/// Contents of a log, the model that it is given to, and words of the message.
+const LOGS: &str = r#"
+time,q1,qd1,cmd1\n0,0,0,1\n0.01,0,0,1\n0.02,0,0,1\n | pendulum | log.csv, line 1: there is no column "tau1" ... say in [drive] of the model file
+time,q1,qd1,tau1\n0,0,0,1\n0.01,0,0,1\n0.02,0,0,1\n | servo    | there is no column "cmd1"
+"#;
 
 #[test]
 fn a_log_of_commands_needs_a_drive() {
-    let folder = tempfile::tempdir().unwrap();
-    let log = folder.path().join("log.csv");
-    fs::write(&log, "time,q1,qd1,cmd1\n0,0,0,1\n0.01,0,0,1\n0.02,0,0,1\n").unwrap();
-    let said = refuses(&["closeloop", "--model", "pendulum", "--train", text(&log)]);
-    assert!(
-        said.contains("log.csv, line 1: there is no column \"tau1\""),
-        "{said}"
-    );
-    assert!(said.contains("say in [drive] of the model file"), "{said}");
-    fs::write(&log, "time,q1,qd1,tau1\n0,0,0,1\n0.01,0,0,1\n0.02,0,0,1\n").unwrap();
-    let said = refuses(&["closeloop", "--model", "servo", "--train", text(&log)]);
-    assert!(said.contains("there is no column \"cmd1\""), "{said}");
+    let scratch = Scratch::new();
+    for [log, model, words] in rows(LOGS) {
+        scratch.file("log.csv", log);
+        let line = format!("closeloop --model {model} --train log.csv");
+        says_words(&scratch.refuses(&line), &words);
+    }
 }
 
 /// The error message for a model file with this drive.
@@ -113,21 +98,12 @@ fn faults_of_a_drive_are_reported_with_their_place() {
 
 #[test]
 fn ready_drives_are_written_into_models() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = mechanisms::fixture("planar_2r.urdf");
+    let scratch = Scratch::new();
+    let new = "new --from-urdf $REPO/tests/fixtures/mechanisms/planar_2r.urdf --drive";
     for drive in Library::drives() {
-        let out = folder.path().join(format!("{}.toml", drive.name));
-        let flags = [
-            "new",
-            "--from-urdf",
-            text(&file),
-            "--drive",
-            &drive.name,
-            "--out",
-        ];
-        succeeds(&[&flags[..], &[text(&out)]].concat());
+        scratch.succeeds(&format!("{new} {} --out arm.toml", drive.name));
         let library = Library::built_in();
-        let model = read_model(&out, &library).unwrap();
+        let model = read_model(scratch.path("arm.toml"), &library).unwrap();
         assert_eq!(model.dynamics().program.inputs()[4], "cmd1");
         let own = |name: &str| model.parameters.iter().any(|p| p.name == name);
         assert!(
@@ -147,14 +123,8 @@ fn ready_drives_are_written_into_models() {
             drive.name
         );
     }
-    let said = refuses(&[
-        "new",
-        "--from-urdf",
-        text(&file),
-        "--drive",
-        "position_server",
-    ]);
-    assert!(said.contains("did you mean `position_servo`"), "{said}");
+    let said = scratch.refuses(&format!("{new} position_server"));
+    says(&said, &["did you mean `position_servo`"]);
 }
 
 #[test]
@@ -247,38 +217,14 @@ integrator = "rk4"
 /// Training a servo's model and planning with it uses targets, and the episode's log holds them.
 #[test]
 fn a_servo_is_trained_and_planned_with() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    fs::write(at("recipe.toml"), RECIPE).unwrap();
-    fs::write(at("task.toml"), TASK).unwrap();
-    succeeds(&[
-        "simulate",
-        "--plant",
-        "servo-real",
-        "--out",
-        text(&at("run.csv")),
-    ]);
-    succeeds(&[
-        "train",
-        "--config",
-        text(&at("recipe.toml")),
-        "--out",
-        text(&at("trained")),
-    ]);
-    succeeds(&[
-        "control",
-        "--checkpoint",
-        text(&at("trained")),
-        "--plant",
-        "servo-real",
-        "--task",
-        text(&at("task.toml")),
-        "--episodes",
-        "1",
-        "--out",
-        text(&at("episodes")),
-    ]);
-    let episode = fs::read_to_string(at("episodes/episode-000.csv")).unwrap();
+    let scratch = Scratch::new();
+    scratch.file("recipe.toml", RECIPE);
+    scratch.file("task.toml", TASK);
+    scratch.succeeds("simulate --plant servo-real --out run.csv");
+    scratch.succeeds("train --config recipe.toml --out trained");
+    let rig = "--checkpoint trained --plant servo-real --task task.toml";
+    scratch.succeeds(&format!("control {rig} --episodes 1 --out episodes"));
+    let episode = scratch.read("episodes/episode-000.csv");
     assert!(episode.starts_with("time,q1,qd1,cmd1\n"));
     // Targets near 1.2 rad, within their range.
     let targets = episode
@@ -293,47 +239,35 @@ fn a_servo_is_trained_and_planned_with() {
 mod slow {
     use super::*;
 
+    const LOGS: &str = "--train run1.csv run2.csv run3.csv --test run4.csv --out out";
+
     #[test]
     fn what_a_drawing_of_a_servo_arm_lacks_is_named() {
         if std::env::var_os("RESIDYN_PYTHON").is_none() {
             eprintln!("SKIPPED: RESIDYN_PYTHON is not set; run tests/run");
             return;
         }
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        fs::write(at("drawn.xml"), arm("", "")).unwrap();
+        let scratch = Scratch::new();
         let friction = |level: f64, rotor: f64| {
             format!("armature=\"{rotor}\" frictionloss=\"{level}\" solreffriction=\"0.0005 1\"")
         };
-        fs::write(
-            at("built.xml"),
-            arm(&friction(0.4, 0.02), &friction(0.15, 0.01)),
-        )
-        .unwrap();
-        let logs: Vec<PathBuf> = (1..=4).map(|k| at(&format!("log{k}.csv"))).collect();
-        let (built, delay) = (at("built.xml"), PathBuf::from("0.014"));
-        let mut arguments: Vec<&Path> = vec![&built, &delay];
-        arguments.extend(logs.iter().map(PathBuf::as_path));
+        scratch.file("drawn.xml", arm("", ""));
+        let built = arm(&friction(0.4, 0.02), &friction(0.15, 0.01));
+        scratch.file("built.xml", built);
+        let files = ["built.xml", "run1.csv", "run2.csv", "run3.csv", "run4.csv"]
+            .map(|name| scratch.path(name));
+        let mut arguments: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+        arguments.insert(1, Path::new("0.014"));
         client("servo.py", &arguments);
-        let model = at("arm.toml");
-        succeeds(&[
-            "new",
-            "--from-mjcf",
-            text(&at("drawn.xml")),
-            "--tip",
-            "fore",
-            "--out",
-            text(&model),
-        ]);
+        scratch.succeeds("new --from-mjcf drawn.xml --tip fore --out arm.toml");
         // The gains of the loops are set by the user, and known.
-        let declared = fs::read_to_string(&model).unwrap();
-        let known = declared.replace(
+        let known = scratch.read("arm.toml").replace(
             "unit = \"N m/rad\", positive = true",
             "unit = \"N m/rad\", fixed = true",
         );
         assert_eq!(known.matches("fixed = true").count(), 5, "{known}");
-        fs::write(&model, known).unwrap();
-        let report = close_the_loop(&model, &logs[..3], &logs[3], &at("out"));
+        scratch.file("arm.toml", known);
+        let report = scratch.json(&format!("closeloop --model arm.toml {LOGS}"));
         assert_eq!(report["verdict"], "explained", "{report:#}");
         // MuJoCo updates positions with the new velocities: half a step ahead.
         let truth = [
@@ -357,43 +291,23 @@ mod slow {
 
     #[test]
     fn what_a_servo_hides_is_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        let logs: Vec<PathBuf> = (1..=4).map(|k| at(&format!("log{k}.csv"))).collect();
-        for (log, seed) in logs.iter().zip(["1", "2", "3", "4"]) {
-            succeeds(&[
-                "simulate",
-                "--plant",
-                "servo-real",
-                "--out",
-                text(log),
-                "--seed",
-                seed,
-            ]);
-        }
-        let header = fs::read_to_string(&logs[0]).unwrap();
-        assert!(header.starts_with("time,q1,qd1,cmd1\n"));
-        let report = close_the_loop(Path::new("servo"), &logs[..3], &logs[3], &at("out"));
+        let scratch = Scratch::new();
+        scratch.simulates("servo-real", &[1, 2, 3, 4]);
+        assert!(scratch.read("run1.csv").starts_with("time,q1,qd1,cmd1\n"));
+        let report = scratch.json(&format!("closeloop --model servo {LOGS}"));
         assert_eq!(report["verdict"], "explained");
         assert_eq!(report["effects"].as_array().unwrap().len(), 2);
         for (name, value) in [("coulomb_friction", 0.12), ("actuator_delay", 0.012)] {
             let estimate = found(&report, name, 1).unwrap();
             assert!(holds(estimate, value), "{name}: {estimate:?}");
         }
-        let text = fs::read_to_string(at("out/report.md")).unwrap();
-        assert!(text.contains("under the logged commands"));
-        assert!(text.contains("`cmd1(t - d1)`"));
+        says(
+            &scratch.read("out/report.md"),
+            &["under the logged commands", "`cmd1(t - d1)`"],
+        );
         // The logs hold no torque, so none can be compared.
         assert!(report["torque"].is_null());
-        let said = refuses(&[
-            "closeloop",
-            "--model",
-            "servo",
-            "--train",
-            self::text(&logs[0]),
-            "--errors",
-            "torque",
-        ]);
-        assert!(said.contains("servo is driven by commands"), "{said}");
+        let said = scratch.refuses("closeloop --model servo --train run1.csv --errors torque");
+        says(&said, &["servo is driven by commands"]);
     }
 }

@@ -2,41 +2,26 @@
 //! unmentioned.
 
 use std::fs;
-use std::path::Path;
-use std::process::Command;
 
 use residyn::{Library, Origin};
 use residyn_core::closeloop::{Request, close_loop};
 use residyn_report as report;
 use residyn_train::ResidualTrainer;
-use serde_json::Value;
 
 use crate::support::catalogue::{rng, system};
 use crate::support::logs::simulate;
-use crate::support::{
-    Scratch, answers, ends_without, refuses, residyn, says, succeeds, swinging, text,
-};
+use crate::support::tables::{rows, says_words};
+use crate::support::{Scratch, says, swinging};
 
-const PENDULUM_OF_TORQUES: &str = r#"
-[system]
-name = "rod"
-joints = 1
-
-[parameters]
-I = { value = 0.3, unit = "kg m^2" }
-G = { value = 3.0, unit = "N m" }
-
-[dynamics]
-mass = [["I"]]
-bias = ["G * sin(q1)"]
-"#;
+/// A pendulum that gives a mass and a bias, so that its motion is compared through its torques.
+const ROD: &str = include_str!("fixtures/rod.toml");
 
 /// The output of `closeloop`, whose report can be read again.
-fn closed(scratch: &Scratch, arguments: &[&str]) -> String {
-    let out = scratch.out();
-    let message = answers(&[&["closeloop", "--budget", "0s", "--out", &out], arguments].concat());
-    succeeds(&["report", &out]);
-    message
+#[track_caller]
+fn closed(scratch: &Scratch, given: &str) -> String {
+    let said = scratch.answers(&format!("closeloop --budget 0s --out out {given}"));
+    scratch.succeeds("report out");
+    said
 }
 
 #[test]
@@ -49,10 +34,9 @@ fn a_network_that_diverges_leaves_the_report_without_one() {
     request.learner = Some(&learner);
     request.settings.learn.learning_rate = 1e9;
     let outcome = close_loop(request, &mut rng(0), &()).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    report::write(folder.path(), &outcome, &Origin::of_seed(0)).unwrap();
-    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
-    let json: Value = serde_json::from_str(&read("report.json")).unwrap();
+    let scratch = Scratch::new();
+    report::write(scratch.folder(), &outcome, &Origin::of_seed(0)).unwrap();
+    let json = scratch.read_json("report.json");
     let failure = json["network"]["failure"].as_str().unwrap();
     says(failure, &["the loss became", "in epoch "]);
     assert_eq!(json["network"]["used"], false);
@@ -63,78 +47,44 @@ fn a_network_that_diverges_leaves_the_report_without_one() {
             .unwrap()
     };
     assert!((error("hybrid") / error("after") - 1.0).abs() < 1e-6);
+    let failed = "The training of a residual network failed";
     says(
-        &read("report.md"),
-        &[
-            "The training of a residual network failed (the loss became",
-            "is the one without a network",
-        ],
+        &scratch.read("report.md"),
+        &[failed, " (the loss became", "is the one without a network"],
     );
-    says(
-        &read("report.html"),
-        &["The training of a residual network failed"],
-    );
-    assert!(folder.path().join("checkpoint").is_dir());
-    succeeds(&["report", text(folder.path())]);
+    says(&scratch.read("report.html"), &[failed]);
+    assert!(scratch.path("checkpoint").is_dir());
+    scratch.succeeds("report .");
 }
 
 #[test]
 fn logs_of_few_and_far_rows_get_an_answer() {
     let scratch = Scratch::new();
-    let torques = scratch.file("torques.toml", PENDULUM_OF_TORQUES);
-    let log = scratch.log("log.csv", swinging);
+    let log_of = |name: &str, rows: u32, step_s: f64| {
+        let times = (0..rows).map(|row| step_s * f64::from(row));
+        scratch.log_at(name, times, swinging);
+    };
+    scratch.file("rod.toml", ROD);
+    log_of("log.csv", 200, 0.01);
     // The fit's windows are shorter than a step of this log.
-    let sparse = scratch.log_at(
-        "sparse.csv",
-        (0..40).map(|row| 0.5 * f64::from(row)),
-        swinging,
-    );
-    let short = scratch.log_at(
-        "short.csv",
-        (0..60).map(|row| 0.01 * f64::from(row)),
-        swinging,
-    );
-    let out = scratch.out();
-    let message = refuses(&[
-        "closeloop",
-        "--model",
-        "pendulum",
-        "--train",
-        &sparse,
-        "--out",
-        &out,
-    ]);
+    log_of("sparse.csv", 40, 0.5);
+    log_of("short.csv", 60, 0.01);
+    let message = scratch.refuses("closeloop --model pendulum --train sparse.csv --out out");
     says(&message, &["the logs contain no window to fit"]);
-    closed(
-        &scratch,
-        &["--model", "pendulum", "--train", &log, "--test", &sparse],
-    );
-    closed(
-        &scratch,
-        &[
-            "--model", &torques, "--train", &sparse, "--errors", "torque",
-        ],
-    );
-    // No row of the test log is half a second from both its ends.
-    closed(
-        &scratch,
-        &["--model", &torques, "--train", &log, "--test", &short],
-    );
+    for given in [
+        "--model pendulum --train log.csv --test sparse.csv",
+        "--model rod.toml --train sparse.csv --errors torque",
+        // No row of the test log is half a second from both its ends.
+        "--model rod.toml --train log.csv --test short.csv",
+    ] {
+        closed(&scratch, given);
+    }
     for rows in 0..5 {
-        let few = scratch.log_at(
-            "few.csv",
-            (0..rows).map(|row| 0.01 * f64::from(row)),
-            swinging,
-        );
-        for command in [
-            &["audit"][..],
-            &["evaluate", "--model", "pendulum", "--test"],
-        ] {
-            let status = residyn(&[command, &[&few]].concat()).status.code();
-            assert!(
-                matches!(status, Some(1 | 2)),
-                "{command:?}, {rows} rows: {status:?}"
-            );
+        log_of("few.csv", rows, 0.01);
+        for line in ["audit few.csv", "evaluate --model pendulum --test few.csv"] {
+            let status = scratch.run(line).status.code();
+            let is_told = matches!(status, Some(1 | 2));
+            assert!(is_told, "{line}, {rows} rows: {status:?}");
         }
     }
 }
@@ -143,78 +93,53 @@ fn logs_of_few_and_far_rows_get_an_answer() {
 fn clocks_that_no_log_has_are_refused_with_their_line() {
     let scratch = Scratch::new();
     let steps = |row: u32| 0.01 * f64::from(row);
-    let late = scratch.log_at(
-        "late.csv",
-        (0..200).map(|row| 1.7e18 + 1e9 * steps(row)),
-        swinging,
-    );
-    let message = refuses(&["audit", &late]);
-    says(
-        &message,
-        &[
-            "late.csv, line 2",
-            "1.7e18 s is beyond 1e12 s",
-            "unit = \"ns\"",
-        ],
-    );
-    let pause = |row: u32| steps(row) + if row < 100 { 0.0 } else { 1e9 };
-    let paused = scratch.log_at("paused.csv", (0..200).map(pause), swinging);
-    let message = refuses(&["audit", &paused]);
-    says(
-        &message,
-        &[
-            "paused.csv, line 102",
-            "time jumps by 1",
-            "from line 101",
-            "cut the file there",
-        ],
-    );
-    // A pause of an hour is accepted.
-    let hour = |row: u32| steps(row) + if row < 100 { 0.0 } else { 3600.0 };
-    answers(&[
-        "audit",
-        &scratch.log_at("hour.csv", (0..200).map(hour), swinging),
-    ]);
+    let late = (0..200).map(|row| 1.7e18 + 1e9 * steps(row));
+    scratch.log_at("late.csv", late, swinging);
+    let paused =
+        |pause_s: f64| (0..200).map(move |row| steps(row) + if row < 100 { 0.0 } else { pause_s });
+    scratch.log_at("paused.csv", paused(1e9), swinging);
+    for [line, words] in rows(
+        r#"audit late.csv   | late.csv, line 2 ... 1.7e18 s is beyond 1e12 s ... unit = "ns"
+           audit paused.csv | paused.csv, line 102 ... time jumps by 1 ... from line 101 ... cut the file there"#,
+    ) {
+        says_words(&scratch.refuses(&line), &words);
+    }
+    scratch.log_at("hour.csv", paused(3600.0), swinging);
+    scratch.answers("audit hour.csv");
 }
 
 #[test]
 fn torques_of_any_size_are_told_in_numbers() {
     let scratch = Scratch::new();
-    let torques = scratch.file("torques.toml", PENDULUM_OF_TORQUES);
-    let tiny = |time: f64| swinging(time).map(|number| 1e-200 * number);
-    let message = answers(&["audit", &scratch.log("tiny.csv", tiny)]);
-    assert!(!message.contains("NaN"), "{message}");
-    let passive = scratch.log("passive.csv", |time| {
+    scratch.file("rod.toml", ROD);
+    scratch.log("tiny.csv", |time| swinging(time).map(|x| 1e-200 * x));
+    let said = scratch.answers("audit tiny.csv");
+    assert!(!said.contains("NaN"), "{said}");
+    scratch.log("passive.csv", |time| {
         let [q, qd, _] = swinging(time);
         [q, qd, 0.0]
     });
-    let message = succeeds(&[
-        "evaluate", "--model", &torques, "--test", &passive, "--torque",
-    ]);
-    says(&message, &["no percentage, the logged torques are zero"]);
-    let logs = ["--train", &passive, "--test", &passive];
+    let said = scratch.succeeds("evaluate --model rod.toml --test passive.csv --torque");
+    says(&said, &["no percentage, the logged torques are zero"]);
     closed(
         &scratch,
-        &[&["--model", &torques, "--errors", "torque"][..], &logs].concat(),
+        "--model rod.toml --errors torque --train passive.csv --test passive.csv",
     );
-    let heavy = PENDULUM_OF_TORQUES.replace("value = 0.3", "value = 1e300");
-    let heavy = scratch.file("heavy.toml", heavy);
-    let message = ends_without(&[
-        "evaluate", "--model", &heavy, "--test", &passive, "--torque",
-    ]);
-    says(&message, &["the torques that rod needs", "are not finite"]);
+    scratch.file("heavy.toml", ROD.replace("value = 0.3", "value = 1e300"));
+    let said = scratch.ends_without("evaluate --model heavy.toml --test passive.csv --torque");
+    says(&said, &["the torques that rod needs", "are not finite"]);
 }
 
 #[test]
 fn what_the_logs_do_not_determine_has_no_end_in_the_report() {
     let scratch = Scratch::new();
     // Too few windows to determine two parameters.
-    let log = scratch.log("log.csv", |time| {
+    scratch.log("log.csv", |time| {
         let [q, qd, _] = swinging(time);
         [q, qd, 1.0]
     });
-    closed(&scratch, &["--model", "pendulum", "--train", &log]);
-    let report = fs::read_to_string(scratch.path("out/report.md")).unwrap();
+    closed(&scratch, "--model pendulum --train log.csv");
+    let report = scratch.read("out/report.md");
     says(&report, &["any value: these logs do not bound it"]);
     assert!(
         !report.contains("inf ") && !report.contains("NaN"),
@@ -222,125 +147,103 @@ fn what_the_logs_do_not_determine_has_no_end_in_the_report() {
     );
 }
 
+/// An acceleration of the pendulum, and words of the message.
+const FORMULAS: &str = "
+1e200 * 1e200 * q1 | this is inf, not a finite number
+log(0) + q1        | this is -inf
+sqrt(1 - 2) * q1   | this is NaN
+q1 / (1 - 1)       | this divides by zero
+";
+
 #[test]
 fn formulas_that_are_no_finite_number_are_refused_with_their_place() {
     let scratch = Scratch::new();
-    for (formula, message) in [
-        ("1e200 * 1e200 * q1", "this is inf, not a finite number"),
-        ("log(0) + q1", "this is -inf"),
-        ("sqrt(1 - 2) * q1", "this is NaN"),
-        ("q1 / (1 - 1)", "this divides by zero"),
-    ] {
-        let model = scratch.moving_by("model.toml", formula);
-        says(
-            &refuses(&["check", &model]),
-            &["model.toml, line 11", message],
-        );
+    for [formula, words] in rows(FORMULAS) {
+        scratch.moving_by("model.toml", &formula);
+        let message = scratch.refuses("check model.toml");
+        says(&message, &["model.toml, line 11", &words]);
     }
 }
 
 #[test]
 fn steps_of_any_length_are_exported_or_refused() {
     let scratch = Scratch::new();
-    let out = text(&scratch.path("out.json")).to_owned();
-    let usual = [
-        "export", "--model", "pendulum", "--format", "json", "--out", &out,
-    ];
+    let export = |model: &str, more: &str| {
+        scratch.run(&format!(
+            "export --model {model} --format json --out out.json {more}"
+        ))
+    };
     for step in ["1e-300", "1e-6", "100"] {
-        succeeds(&[&usual[..], &["--step", step]].concat());
+        let output = export("pendulum", &format!("--step {step}"));
+        assert!(output.status.success(), "{step}");
     }
-    let unstable = scratch.moving_by("unstable.toml", "1e6 * q1 + C_g * sin(q1) + C_i * tau1");
-    let output = residyn(&[
-        "export", "--model", &unstable, "--format", "json", "--out", &out,
-    ]);
+    scratch.moving_by("unstable.toml", "1e6 * q1 + C_g * sin(q1) + C_i * tau1");
+    let output = export("unstable.toml", "");
     assert!(output.status.success());
-    let message = String::from_utf8_lossy(&output.stderr);
     says(
-        &message,
+        &String::from_utf8_lossy(&output.stderr),
         &["note: the rollout is no longer finite in step "],
     );
-    let output = residyn(&[&usual[..], &["--step", "1e300"]].concat());
+    let output = export("pendulum", "--step 1e300");
     assert_eq!(output.status.code(), Some(1));
-    let message = String::from_utf8_lossy(&output.stdout);
     says(
-        &message,
+        &String::from_utf8_lossy(&output.stdout),
         &["the model itself is not finite in a step of 1e300 s from the state ["],
     );
-    for substeps in ["fine:1001", "fine:4294967295"] {
-        let message = refuses(&[&usual[..], &["--integrator", substeps]].concat());
-        says(&message, &["at most 1000 substeps"]);
+    let delay = "[[effect]]\nname = \"actuator_delay\"\njoint = 1\nd = 0.02\n\n[energy]";
+    scratch.model("delayed.toml", "[energy]", delay);
+    scratch.model("heavy.toml", "value = 15.0", "value = 1e300");
+    for [given, words] in rows(
+        "--model pendulum --format json --integrator fine:1001       | at most 1000 substeps
+         --model pendulum --format json --integrator fine:4294967295 | at most 1000 substeps
+         --model delayed.toml --format json --step 1e-9 | the delay of joint 1 is 0.02 s ... at most 10000 steps ... steps of 1e-9 s are remembered ... set it with --step
+         --model heavy.toml --format onnx               | 1e300 is beyond single precision",
+    ) {
+        says_words(
+            &scratch.refuses(&format!("export {given} --out out.json")),
+            &words,
+        );
     }
-    let delay = "\n[[effect]]\nname = \"actuator_delay\"\njoint = 1\nd = 0.02\n";
-    let delayed = scratch.file(
-        "delayed.toml",
-        include_str!("../models/pendulum.toml").to_owned() + delay,
-    );
-    let line = [
-        "export", "--model", &delayed, "--format", "json", "--out", &out, "--step", "1e-9",
-    ];
-    says(
-        &refuses(&line),
-        &["the delay of joint 1 is 0.02 s", "at most 10000 steps"],
-    );
-    let heavy = scratch.model("heavy.toml", "value = 15.0", "value = 1e300");
-    let line = [
-        "export", "--model", &heavy, "--format", "onnx", "--out", &out,
-    ];
-    says(&refuses(&line), &["1e300 is beyond single precision"]);
 }
+
+/// A text of a recipe, what stands there instead, and words of the message.
+const RECIPES: &str = r#"
+position = [[-3.141592653589793, 3.141592653589793]] | position = [[-1e308, 1e308]] | numbers up to 1e30 are accepted
+torque = [[-3.0, 3.0]] | torque = [[0, 1e300]] | numbers up to 1e30 are accepted
+penalty = { fixed = { alpha = 1e-4 } }\nintegrator = "semi_implicit_euler" | integrator = { fine = { steps = 4294967295 } } | at most 1000 substeps
+"#;
 
 #[test]
 fn rigs_and_tasks_beyond_any_sensor_are_refused() {
     let scratch = Scratch::new();
-    let out = scratch.out();
-    let beyond = "numbers up to 1e30 are accepted";
-    for (from, to) in [
-        (
-            "position = [[-3.141592653589793, 3.141592653589793]]",
-            "position = [[-1e308, 1e308]]",
-        ),
-        ("torque = [[-3.0, 3.0]]", "torque = [[0, 1e300]]"),
-    ] {
-        let recipe = scratch.changed("smoke/train-pendulum.toml", from, to);
-        says(
-            &refuses(&["train", "--config", &recipe, "--out", &out]),
-            &[beyond],
-        );
+    for [from, to, words] in rows(RECIPES) {
+        scratch.changed("smoke/train-pendulum.toml", &from, &to);
+        let message = scratch.refuses("train --config train-pendulum.toml --out out");
+        says(&message, &[&words]);
     }
-    let plant = ["control", "--model", "pendulum", "--plant", "pendulum-sim"];
-    for flags in [
-        &["--torque", "inf"][..],
-        &["--start", "1e300", "0"],
-        &["--noise", "1e300", "0"],
-    ] {
-        says(&refuses(&[&plant, flags].concat()), &[beyond]);
+    assert!(!scratch.has("out"));
+    for flags in ["--torque inf", "--start 1e300 0", "--noise 1e300 0"] {
+        let control = "control --model pendulum --plant pendulum-sim";
+        let message = scratch.refuses(&format!("{control} {flags}"));
+        says(&message, &["numbers up to 1e30 are accepted"]);
     }
-    let recipe = scratch.changed(
-        "smoke/train-pendulum.toml",
-        "penalty = { fixed = { alpha = 1e-4 } }\nintegrator = \"semi_implicit_euler\"",
-        "integrator = { fine = { steps = 4294967295 } }",
-    );
-    let message = refuses(&["train", "--config", &recipe, "--out", &out]);
-    says(&message, &["at most 1000 substeps"]);
-    assert!(!Path::new(&out).exists());
 }
 
 #[test]
 fn effects_are_taken_out_of_a_model_wherever_they_stand() {
     let scratch = Scratch::new();
-    let log = scratch.log("log.csv", swinging);
+    scratch.log("log.csv", swinging);
     let effect = "name = \"coulomb_friction\"\njoint = 1\nF_c = 0.1\n";
     let inline = effect.trim_end().replace('\n', ", ");
     let about = "name = \"rod\"\nabout = \"\"\"\n[[effect]]\n\"\"\"";
     for described in [
-        PENDULUM_OF_TORQUES.replace("name = \"rod\"", about),
-        format!("effect = [{{ {inline} }}]\n{PENDULUM_OF_TORQUES}"),
-        format!("[[effect]]\n{effect}{PENDULUM_OF_TORQUES}"),
+        ROD.replace("name = \"rod\"", about),
+        format!("effect = [{{ {inline} }}]\n{ROD}"),
+        format!("[[effect]]\n{effect}{ROD}"),
     ] {
-        let model = scratch.file("model.toml", described);
-        closed(&scratch, &["--model", &model, "--train", &log]);
-        let written = scratch.path("out/model.toml");
-        succeeds(&["evaluate", "--model", text(&written), "--test", &log]);
+        scratch.file("model.toml", described);
+        closed(&scratch, "--model model.toml --train log.csv");
+        scratch.succeeds("evaluate --model out/model.toml --test log.csv");
     }
 }
 
@@ -352,48 +255,22 @@ fn effects_without_parameters_have_none_to_set() {
         "own/push.toml",
         "[effect]\nname = \"push\"\nabout = \"a push\"\nforce = \"0.1 * cos(q)\"\n\n[parameters]\n",
     );
-    let (own, out) = (scratch.path("own"), scratch.out());
-    let usual = [
-        "simulate",
-        "--plant",
-        "pendulum",
-        "--out",
-        &out,
-        "--effects",
-        text(&own),
-    ];
-    let message = refuses(&[&usual[..], &["--effect", "push=1"]].concat());
-    says(&message, &["push has no parameter"]);
+    let line = "simulate --plant pendulum --out out --effects own --effect push=1";
+    says(&scratch.refuses(line), &["push has no parameter"]);
 }
 
 #[test]
 fn rewards_and_plans_that_are_no_finite_numbers_end_control() {
     let scratch = Scratch::new();
-    let control = |objective: &str| {
-        let task = scratch.changed("tasks/pendulum.toml", "objective = \"cos(q1)\"", objective);
-        ends_without(&[
-            "control",
-            "--model",
-            "pendulum",
-            "--plant",
-            "pendulum-sim",
-            "--task",
-            &task,
-        ])
-    };
-    says(
-        &control("objective = \"log(q1 - 100)\""),
-        &["the objective of the task is NaN in the state at 0.020 s"],
-    );
-    // Double precision can represent these numbers, but the single precision of plans cannot.
-    says(
-        &control("objective = \"1e300 * (1 + q1^2)\""),
-        &[
-            "10 of 10 plan(s) failed",
-            "in episode 0 at 0.000 s",
-            "no candidate has a finite return",
-        ],
-    );
+    // Double precision can represent the second objective, but the single precision of plans cannot.
+    for [objective, words] in rows(
+        r#"objective = "log(q1 - 100)" | the objective of the task is NaN in the state at 0.020 s
+           objective = "1e300 * (1 + q1^2)" | 10 of 10 plan(s) failed ... in episode 0 at 0.000 s ... no candidate has a finite return"#,
+    ) {
+        scratch.changed("tasks/pendulum.toml", "objective = \"cos(q1)\"", &objective);
+        let line = "control --model pendulum --plant pendulum-sim --task pendulum.toml";
+        says_words(&scratch.ends_without(line), &words);
+    }
 }
 
 /// A mass whose inverse is infinite: dividing by it overflows.
@@ -403,12 +280,10 @@ fn a_mass_too_small_for_its_inverse_is_no_mechanism() {
     let light = "[system]\nname = \"axis\"\njoints = 1\nprismatic = [1]\n\
                  [parameters]\nm = { value = 1e-320, unit = \"kg\" }\n\
                  [dynamics]\nmass = [[\"m\"]]\nbias = [\"0\"]\n";
-    let model = scratch.file("light.toml", light);
+    scratch.file("light.toml", light);
     for format in ["mjcf", "urdf"] {
-        let out = text(&scratch.path("light.xml")).to_owned();
-        let export = ["export", "--model", &model, "--format", format];
-        let message = refuses(&[&export[..], &["--out", &out]].concat());
-        says(&message, &["too small or too large"]);
+        let line = format!("export --model light.toml --format {format} --out light.xml");
+        says(&scratch.refuses(&line), &["too small or too large"]);
     }
 }
 
@@ -418,22 +293,24 @@ fn plans_that_are_no_finite_numbers_end_a_run_of_learning() {
     let infinite = "objective = \"1e300 * (1 + q1^2)\"";
     scratch.changed("tasks/pendulum.toml", "objective = \"cos(q1)\"", infinite);
     let own = "task = \"pendulum.toml\"";
-    let config = scratch.changed(
+    scratch.changed(
         "smoke/physics-prior-pendulum.toml",
         "task = \"pendulum\"",
         own,
     );
-    for command in [&["mbrl"][..], &["experiment", "physics-prior"]] {
-        let out = scratch.path(command[0]);
-        let run = ["--config", &config, "--out", text(&out)];
+    for (command, out) in [("mbrl", "a"), ("experiment physics-prior", "b")] {
+        let given = format!("--config physics-prior-pendulum.toml --out {out}");
         says(
-            &ends_without(&[command, &run].concat()),
+            &scratch.ends_without(&format!("{command} {given}")),
             &["no candidate plan at 0.000 s has a finite return"],
         );
     }
 }
 
 mod slow {
+    #[cfg(unix)]
+    use crate::support::within;
+
     use super::*;
 
     #[test]
@@ -446,27 +323,18 @@ mod slow {
         };
         let sums: Vec<String> = (0..300).map(|k| sum(20 * k)).collect();
         let model = scratch.moving_by("model.toml", &(sums.join(" + ") + " + C_i * tau1"));
-        for (format, out) in [
+        for (format, name) in [
             ("c", "model.h"),
             ("python", "model.py"),
             ("latex", "model.tex"),
         ] {
-            let out = scratch.path(out);
+            let out = scratch.path(name);
+            let export = ["export", "--model", &model, "--format", format, "--out"];
             // Without a compiler, which would need memory as well.
-            let output = Command::new("bash")
-                .args(["-c", "ulimit -v 200000; exec \"$0\" \"$@\""])
-                .arg(env!("CARGO_BIN_EXE_residyn"))
-                .args([
-                    "export",
-                    "--model",
-                    &model,
-                    "--format",
-                    format,
-                    "--out",
-                    text(&out),
-                ])
+            let output = within(200_000)
+                .args(export)
+                .arg(&out)
                 .envs([("CC", "none"), ("RESIDYN_PYTHON", "none")])
-                .envs([("MALLOC_ARENA_MAX", "1"), ("RAYON_NUM_THREADS", "2")])
                 .output()
                 .unwrap();
             let message = String::from_utf8_lossy(&output.stderr);

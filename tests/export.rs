@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 use crate::support::catalogue::{USER_EFFECT, rng, system};
 use crate::support::clients::client;
 use crate::support::predictions::{agree, client_agrees, expected, predictions, written};
-use crate::support::{exported_models, refuses, residyn, succeeds, text};
+use crate::support::tables::rows;
+use crate::support::{Scratch, exported_models, says};
 
 /// The reader of descriptions that docs/export.md shows.
 const DESCRIPTION: PythonClient = PythonClient {
@@ -22,34 +23,18 @@ const DESCRIPTION: PythonClient = PythonClient {
 
 #[test]
 fn an_exported_description_imports_as_a_checkpoint() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| text(&folder.path().join(name)).to_owned();
-    let checkpoint = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/acrobot-sim");
-    let first = [
-        "export",
-        "--checkpoint",
-        text(&checkpoint),
-        "--format",
-        "json",
-        "--out",
-    ];
-    let printed = succeeds(&[&first[..], &[&at("a.json"), "--json"]].concat());
-    let printed: Value = serde_json::from_str(&printed).unwrap();
+    let scratch = Scratch::new();
+    let export = |checkpoint: &str, out: &str| {
+        let given = format!("--checkpoint {checkpoint} --format json --out {out}");
+        scratch.json(&format!("export {given}"))
+    };
+    let printed = export("$REPO/checkpoints/acrobot-sim", "a.json");
     assert_eq!(printed["difference"]["rollout"], 0.0);
-    succeeds(&["import", "--file", &at("a.json"), "--out", &at("back")]);
-    let again = [
-        "export",
-        "--checkpoint",
-        &at("back"),
-        "--format",
-        "json",
-        "--out",
-    ];
-    succeeds(&[&again[..], &[&at("b.json")]].concat());
-    let weights = |name: &str| std::fs::read(at(name)).unwrap();
+    scratch.succeeds("import --file a.json --out back");
+    export("back", "b.json");
+    let weights = |name: &str| std::fs::read(scratch.path(name)).unwrap();
     assert!(weights("a.safetensors") == weights("b.safetensors"));
-    let description = |name: &str| -> Value { serde_json::from_slice(&weights(name)).unwrap() };
-    let (before, after) = (description("a.json"), description("b.json"));
+    let [before, after] = ["a.json", "b.json"].map(|name| scratch.read_json(name));
     for key in [
         "prior",
         "residual",
@@ -64,99 +49,61 @@ fn an_exported_description_imports_as_a_checkpoint() {
 
 #[test]
 fn errors_in_imported_files_name_a_remedy() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| text(&folder.path().join(name)).to_owned();
-    succeeds(&[
-        "export",
-        "--model",
-        "pendulum",
-        "--format",
-        "json",
-        "--out",
-        &at("m.json"),
-    ]);
+    let scratch = Scratch::new();
+    scratch.succeeds("export --model pendulum --format json --out m.json");
+    let import = || {
+        let message = scratch.refuses("import --file n.json --out back");
+        assert!(!scratch.has("back"), "something was written");
+        message
+    };
     let message = |change: &dyn Fn(&mut Value)| {
-        let mut json: Value =
-            serde_json::from_slice(&std::fs::read(at("m.json")).unwrap()).unwrap();
+        let mut json = scratch.read_json("m.json");
         change(&mut json);
-        std::fs::write(at("n.json"), json.to_string()).unwrap();
-        let message = refuses(&["import", "--file", &at("n.json"), "--out", &at("back")]);
-        assert!(
-            !folder.path().join("back").exists(),
-            "something was written"
-        );
-        message.replace(&at(""), "")
+        scratch.file("n.json", json.to_string());
+        import()
     };
     assert_eq!(
         message(&|json| json["residyn_model"] = json!(2)),
         "error: n.json has format 2, this program reads 1; use the residyn that wrote it (0.1.0)\n"
     );
     let missing = message(&|json| json["weights"] = json!("gone.safetensors"));
-    assert!(
-        missing.starts_with("error: gone.safetensors cannot be read: "),
-        "{missing}"
-    );
+    says(&missing, &["error: gone.safetensors cannot be read: "]);
     let other = message(&|json| json["parameters"][0]["name"] = json!("C_h"));
-    assert!(
-        other.contains("there is no tensor `parameters.C_h`"),
-        "{other}"
-    );
-    let model =
-        message(&|json| json["model_toml"] = json!("[system]\nname = \"pendulum\"\njoint = 1\n"));
-    assert!(
-        model.contains("unknown key `joint`") && model.contains("line 3"),
-        "{model}"
-    );
-    std::fs::write(at("n.json"), "{").unwrap();
-    let message = refuses(&["import", "--file", &at("n.json"), "--out", &at("back")]);
-    assert!(message.contains("line 1 column 1"), "{message}");
+    says(&other, &["there is no tensor `parameters.C_h`"]);
+    let wrong = "[system]\nname = \"pendulum\"\njoint = 1\n";
+    let model = message(&|json| json["model_toml"] = json!(wrong));
+    says(&model, &["unknown key `joint`", "line 3"]);
+    scratch.file("n.json", "{");
+    says(&import(), &["line 1 column 1"]);
 }
+
+/// Arguments of an export, and words of the message.
+const REFUSED: &str = "
+--model pendulum --format onyx                                 | did you mean `onnx`?
+--model pendulum --format json --step 0                        | --step 0: a step is a number of seconds above zero
+--model pendulum --format json --integrator fine:0             | fine:N
+--model pendulum --format safetensors                          | both would be
+";
 
 #[test]
 fn a_refused_export_writes_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = text(&folder.path().join("m.json")).to_owned();
-    let export = |more: &[&str]| refuses(&[&["export", "--out", &out], more].concat());
-    let unknown = export(&["--model", "pendulum", "--format", "onyx"]);
-    assert!(unknown.contains("did you mean `onnx`?"), "{unknown}");
-    let step = export(&["--model", "pendulum", "--format", "json", "--step", "0"]);
-    assert!(
-        step.contains("--step 0: a step is a number of seconds above zero"),
-        "{step}"
-    );
-    let integrator = export(&[
-        "--model",
-        "pendulum",
-        "--format",
-        "json",
-        "--integrator",
-        "fine:0",
-    ]);
-    assert!(integrator.contains("fine:N"), "{integrator}");
-    let same = export(&["--model", "pendulum", "--format", "safetensors"]);
-    assert!(same.contains("both would be"), "{same}");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let scratch = Scratch::new();
+    for [given, words] in rows(REFUSED) {
+        let message = scratch.refuses(&format!("export --out m.json {given}"));
+        says(&message, &[&words]);
+    }
+    assert_eq!(scratch.count(), 0);
 }
 
 #[test]
 fn the_folder_of_an_export_is_made() {
-    let folder = tempfile::tempdir().unwrap();
-    let export = |out: &Path| {
-        let out = text(out);
-        [
-            "export", "--model", "pendulum", "--format", "json", "--out", out,
-        ]
-        .map(str::to_owned)
-    };
-    let run = |out: &Path| residyn(&export(out).each_ref().map(String::as_str));
-    let deep = folder.path().join("made/for/it/m.json");
-    assert_eq!(run(&deep).status.code(), Some(0));
-    assert!(deep.is_file());
+    let scratch = Scratch::new();
+    let export = "export --model pendulum --format json --out";
+    scratch.succeeds(&format!("{export} made/for/it/m.json"));
+    assert!(scratch.path("made/for/it/m.json").is_file());
     // A file stands where a folder is needed.
-    let nowhere = run(&deep.join("below/m.json"));
-    assert_eq!(nowhere.status.code(), Some(2));
-    let said = String::from_utf8(nowhere.stderr).unwrap();
-    assert!(said.contains("below: cannot be written"), "{said}");
+    let message = scratch.refuses(&format!("{export} made/for/it/m.json/below/m.json"));
+    says(&message, &["below: cannot be written"]);
 }
 
 #[test]
@@ -186,44 +133,33 @@ driven = 1
 
 #[test]
 fn a_description_needs_no_effect_files_to_be_read() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| text(&folder.path().join(name)).to_owned();
-    std::fs::create_dir(at("effects")).unwrap();
-    std::fs::write(at("effects/eddy_brake.toml"), USER_EFFECT).unwrap();
+    let scratch = Scratch::new();
+    std::fs::create_dir(scratch.path("effects")).unwrap();
+    scratch.file("effects/eddy_brake.toml", USER_EFFECT);
     let effect = "[[effect]]\nname = \"eddy_brake\"\njoint = 1\nT_m = 0.3\nv_m = 2.0\n";
-    std::fs::write(
-        at("braked.toml"),
-        format!("{}\n{effect}", system("pendulum").text),
-    )
-    .unwrap();
-    let export = [
-        "export",
-        "--model",
-        &at("braked.toml"),
-        "--effects",
-        &at("effects"),
-    ];
-    let json = ["--format", "json", "--out", &at("braked.json"), "--json"];
-    let printed = succeeds(&[&export[..], &json].concat());
-    let printed: Value = serde_json::from_str(&printed).unwrap();
+    let braked = format!("{}\n{effect}", system("pendulum").text);
+    scratch.file("braked.toml", braked);
+    let given = "--model braked.toml --effects effects --format json --out braked.json";
+    let printed = scratch.json(&format!("export {given}"));
     for what in ["next", "derivative", "rollout"] {
         let difference = printed["difference"][what].as_f64().unwrap();
         assert!(difference < 1e-12, "{what}: {difference:e}");
     }
-    let import = [
-        "import",
-        "--file",
-        &at("braked.json"),
-        "--out",
-        &at("braked"),
-    ];
-    let unknown = refuses(&import);
-    assert!(unknown.contains("unknown effect `eddy_brake`"), "{unknown}");
-    succeeds(&[&import[..], &["--effects", &at("effects")]].concat());
+    let import = "import --file braked.json --out braked";
+    let unknown = scratch.refuses(import);
+    says(&unknown, &["unknown effect `eddy_brake`"]);
+    scratch.succeeds(&format!("{import} --effects effects"));
 }
 
 mod slow {
     use super::*;
+
+    /// A client compares a written file with what is expected of it.
+    fn expects(script: &str, folder: &Path, path: &Path, expected: &Value) {
+        let file = folder.join("expected.json");
+        std::fs::write(&file, expected.to_string()).unwrap();
+        client(script, &[path, &file]);
+    }
 
     /// Checks for a new format without a test of its own.
     #[test]
@@ -245,19 +181,10 @@ mod slow {
     }
 
     #[test]
-    fn onnxruntime_predicts_the_same() {
-        client_agrees(find("onnx").unwrap(), &exported_models::all());
-    }
-
-    #[test]
-    fn a_python_module_predicts_the_same() {
-        client_agrees(find("python").unwrap(), &exported_models::all());
-    }
-
-    #[test]
-    fn a_description_is_read_back_to_the_same_model() {
-        client_agrees(find("json").unwrap(), &exported_models::all());
-        client_agrees(find("safetensors").unwrap(), &exported_models::all());
+    fn clients_predict_the_same_from_models_of_every_kind() {
+        for format in ["onnx", "python", "json", "safetensors"] {
+            client_agrees(find(format).unwrap(), &exported_models::all());
+        }
     }
 
     #[test]
@@ -281,9 +208,7 @@ mod slow {
                 .collect();
             let expected =
                 json!({"system": model.name(), "step_s": model.step_s, "parameters": parameters});
-            let file = folder.path().join("expected.json");
-            std::fs::write(&file, expected.to_string()).unwrap();
-            client("onnx_checker.py", &[&path, &file]);
+            expects("onnx_checker.py", folder.path(), &path, &expected);
         }
     }
 
@@ -302,9 +227,7 @@ mod slow {
                 .collect();
             let expected =
                 json!({"states": samples.states, "torques": samples.torques, "rewards": rewards});
-            let file = folder.path().join("expected.json");
-            std::fs::write(&file, expected.to_string()).unwrap();
-            client("environment.py", &[&path, &file]);
+            expects("environment.py", folder.path(), &path, &expected);
         }
     }
 
@@ -326,10 +249,8 @@ mod slow {
                     r"$C_{i}$ & $3$ & $\mathrm{1/(kg\,m^{2})}$ & not fitted",
                 ]);
             }
-            let expected = folder.path().join("expected.json");
-            let json = json!({"environments": environments, "pieces": pieces});
-            std::fs::write(&expected, json.to_string()).unwrap();
-            client("latex.py", &[&path, &expected]);
+            let expected = json!({"environments": environments, "pieces": pieces});
+            expects("latex.py", folder.path(), &path, &expected);
         }
     }
 

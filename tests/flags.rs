@@ -7,7 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::support::paths::{crates, ours};
-use crate::support::{Scratch, refuses, says, succeeds, swinging};
+use crate::support::tables::{rows, says_words};
+use crate::support::{Scratch, says, succeeds, swinging};
 
 /// The flags that a text names: `--train` and the like.
 fn flags(text: &str) -> BTreeSet<String> {
@@ -59,52 +60,26 @@ fn the_library_names_no_flag() {
     }
 }
 
+/// Commands, and words of their messages.
+const MENDED: &str = "
+closeloop --model pendulum --out out --train long.csv --test short.csv | the test logs contain no window ... --test names the test logs
+closeloop --model pendulum --out out --train long.csv --errors torque | torques cannot be compared ... pendulum gives accelerations ... --errors motion compares the motion
+new --from-urdf y.urdf | branches ... --tip names the last body
+";
+
 #[test]
 fn the_command_line_says_which_flag_mends_an_error() {
     let scratch = Scratch::new();
-    let short = scratch.log_at("short.csv", (0..9).map(|row| 0.01 * f64::from(row)), |_| {
-        [0.0; 3]
-    });
-    let (long, out) = (scratch.log("long.csv", swinging), scratch.out());
-    let model = [
-        "closeloop",
-        "--model",
-        "pendulum",
-        "--out",
-        &out,
-        "--train",
-        &long,
-    ];
-    let message = refuses(&[&model[..], &["--test", &short]].concat());
-    says(
-        &message,
-        &[
-            "the test logs contain no window",
-            "--test names the test logs",
-        ],
-    );
-    let message = refuses(&[&model[..], &["--errors", "torque"]].concat());
-    says(
-        &message,
-        &[
-            "torques cannot be compared",
-            "--errors motion compares the motion",
-        ],
-    );
+    let times = (0..9).map(|row| 0.01 * f64::from(row));
+    scratch.log_at("short.csv", times, |_| [0.0; 3]);
+    scratch.log("long.csv", swinging);
     let branches = r#"<robot name="y"><link name="base"/><link name="a"/><link name="b"/>
 <joint name="ja" type="continuous"><parent link="base"/><child link="a"/></joint>
 <joint name="jb" type="continuous"><parent link="base"/><child link="b"/></joint></robot>"#;
-    let message = refuses(&["new", "--from-urdf", &scratch.file("y.urdf", branches)]);
-    says(&message, &["branches", "--tip names the last body"]);
-    let delay = "\n[[effect]]\nname = \"actuator_delay\"\njoint = 1\nd = 0.02\n";
-    let delayed = scratch.model("delayed.toml", "[energy]", &format!("{delay}\n[energy]"));
-    let line = [
-        "export", "--model", &delayed, "--format", "json", "--out", &out, "--step", "1e-9",
-    ];
-    says(
-        &refuses(&line),
-        &["steps of 1e-9 s are remembered", "set it with --step"],
-    );
+    scratch.file("y.urdf", branches);
+    for [line, words] in rows(MENDED) {
+        says_words(&scratch.refuses(&line), &words);
+    }
 }
 
 #[test]
@@ -113,9 +88,9 @@ fn a_finding_is_mended_by_a_flag_on_the_command_line_alone() {
     // The logger stopped for half a second.
     let times = (0..600).map(|row| 0.01 * f64::from(row) + if row < 300 { 0.0 } else { 0.5 });
     let log = scratch.log_at("gap.csv", times, swinging);
-    let output = crate::support::residyn(&["audit", &log]);
+    let output = scratch.run("audit gap.csv");
     let message = String::from_utf8(output.stdout).unwrap();
-    assert!(message.contains("paste: --leave-out gap.csv@"), "{message}");
+    says(&message, &["paste: --leave-out gap.csv@"]);
     let log = read_standard_log(Path::new(&log)).unwrap();
     let audit = residyn_core::data::audit(&log, &residyn_core::data::Columns::default());
     let message = audit.to_string();

@@ -7,105 +7,72 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Command, Output};
-use std::sync::OnceLock;
 
 use residyn_io::runs::RunFolder;
 
-use crate::support::bench::{Bench, RIGS};
+use crate::support::bench::{RIGS, bench};
 use crate::support::exported_models::exported;
-use crate::support::paths::config;
-use crate::support::{refuses, says, text};
+use crate::support::{Scratch, copy_files, says, words};
 
-/// The commands that work in the folder of `--out`.
-fn commands() -> Vec<Vec<String>> {
-    let [recipe, tuning, experiment, grid] = [
-        "smoke/train-pendulum.toml",
-        "smoke/tune-pendulum.toml",
-        "smoke/physics-prior-pendulum.toml",
-        "bench/smoke.toml",
-    ]
-    .map(config);
-    let prior = config("../checkpoints/pendulum-sim");
-    let checkpoint = ["--checkpoint", &prior];
-    let config = ["--config", &experiment];
-    let plant = ["--plant", "pendulum-real", "--task", "pendulum"];
-    let exported = exported().join("model.json");
-    let rigs = measured_rigs();
-    let [data, file] = [rigs.path(""), rigs.path("rigs.toml")];
-    let rigs = ["--data", text(&data), "--rigs", text(&file)];
-    let all: [&[&[&str]]; 11] = [
-        &[&["closeloop", "--verbose"]],
-        &[&["train", "--config", &recipe]],
-        &[&["tune", "--config", &tuning], &checkpoint],
-        &[&["sweep", "--seeds", "2", "--config", &recipe]],
-        &[&["mbrl"], &config],
-        &[&["experiment", "physics-prior"], &config],
-        &[&["bench", "effects", "--grid", &grid]],
-        &[&["bench", "rigs"], &rigs],
-        &[&["import", "--file", text(&exported)]],
-        &[&["control"], &checkpoint, &plant],
-        &[&["merge", "part"]],
-    ];
-    let owned = |words: &[&[&str]]| words.concat().into_iter().map(str::to_owned).collect();
-    all.into_iter().map(owned).collect()
-}
+/// The commands that work in the folder of `--out`, run in [`input`].
+const COMMANDS: [&str; 11] = [
+    "closeloop --verbose",
+    "train --config $REPO/configs/smoke/train-pendulum.toml",
+    "tune --config $REPO/configs/smoke/tune-pendulum.toml --checkpoint $REPO/checkpoints/pendulum-sim",
+    "sweep --seeds 2 --config $REPO/configs/smoke/train-pendulum.toml",
+    "mbrl --config $REPO/configs/smoke/physics-prior-pendulum.toml",
+    "experiment physics-prior --config $REPO/configs/smoke/physics-prior-pendulum.toml",
+    "bench effects --grid $REPO/configs/bench/smoke.toml",
+    "bench rigs --data . --rigs rigs.toml",
+    "import --file model.json",
+    "control --checkpoint $REPO/checkpoints/pendulum-sim --plant pendulum-real --task pendulum",
+    "merge part",
+];
 
-/// A file of rigs, and their logs.
-fn measured_rigs() -> &'static Bench {
-    static RIGS_AND_LOGS: OnceLock<Bench> = OnceLock::new();
-    RIGS_AND_LOGS.get_or_init(|| Bench::new(RIGS))
-}
-
-fn with_out<'a>(command: &'a [String], out: &'a str) -> Vec<&'a str> {
-    let words = command.iter().map(String::as_str);
-    words.chain(["--out", out]).collect()
+/// A folder with a file of rigs, their logs, and an exported model.
+fn input() -> Scratch {
+    let scratch = bench(RIGS);
+    copy_files(exported(), scratch.folder());
+    scratch
 }
 
 #[test]
 fn one_at_a_time_works_in_a_folder() {
-    let scratch = tempfile::tempdir().unwrap();
-    let out = scratch.path().join("out");
-    let folder = RunFolder::open(&out).unwrap();
+    let scratch = input();
+    let there = scratch.count();
+    let folder = RunFolder::open(&scratch.path("out")).unwrap();
     let process = format!("process {},", std::process::id());
-    for command in commands() {
-        let message = refuses(&with_out(&command, text(&out)));
+    for command in COMMANDS {
+        let message = scratch.refuses(&format!("{command} --out out"));
         says(
             &message,
-            &[text(&out), &process, "is working there", "with --out"],
+            &["out", &process, "is working there", "with --out"],
         );
     }
     drop(folder);
-    assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
-}
-
-/// The program's output when it cannot write a file of more than a kilobyte, as on a full disk.
-fn on_a_full_disk(arguments: &[&str]) -> Output {
-    Command::new("bash")
-        .args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\""])
-        .arg(env!("CARGO_BIN_EXE_residyn"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-/// Only the error, which names the folder.
-fn is_told(output: &Output, out: &str) {
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    let error = format!("error: {out}: cannot be written: ");
-    assert!(message.starts_with(&error), "{message}");
-    says(&message, &["give another folder with --out"]);
+    assert_eq!(scratch.count(), there);
 }
 
 #[test]
 fn a_full_disk_is_told_before_the_work() {
-    let scratch = tempfile::tempdir().unwrap();
-    let out = scratch.path().join("out");
-    let simulate = ["simulate", "--plant", "pendulum"].map(str::to_owned);
-    for command in commands().into_iter().chain([simulate.to_vec()]) {
-        let output = on_a_full_disk(&with_out(&command, text(&out)));
-        is_told(&output, text(&out));
-        assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
+    let scratch = input();
+    let there = scratch.count();
+    for command in COMMANDS.into_iter().chain(["simulate --plant pendulum"]) {
+        // No file of more than a kilobyte can be written, as on a full disk.
+        let output = Command::new("bash")
+            .args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\""])
+            .arg(env!("CARGO_BIN_EXE_residyn"))
+            .args(words(&format!("{command} --out out")))
+            .current_dir(scratch.folder())
+            .output()
+            .unwrap();
+        // Only the error, which names the folder.
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        let error = "error: out: cannot be written: ";
+        assert!(message.starts_with(error), "{message}");
+        says(&message, &["give another folder with --out"]);
+        assert_eq!(scratch.count(), there, "{command} left something");
     }
 }
 

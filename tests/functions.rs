@@ -5,7 +5,7 @@ use residyn_train::replay;
 
 use rand::RngExt;
 
-use crate::support::catalogue::{assert_near, column, in_f32, rng};
+use crate::support::catalogue::{assert_all_near, assert_near, column, in_f32, rng};
 use crate::support::tensors::{devices, numbers, tensor};
 
 /// A formula of x and y, its value and its slopes, written by hand.
@@ -148,13 +148,8 @@ fn values_and_slopes_in_f64() {
     for case in CASES {
         let program = program(case.formula, SignForm::Exact);
         for point in grid() {
-            for (found, wanted) in program
-                .eval(&point)
-                .iter()
-                .zip((case.truth)(point[0], point[1]))
-            {
-                assert_near(*found, wanted, F64, case.formula);
-            }
+            let truth = (case.truth)(point[0], point[1]);
+            assert_all_near(&program.eval(&point), &truth, F64, case.formula);
         }
     }
 }
@@ -164,9 +159,8 @@ fn values_and_slopes_in_f32() {
     for case in CASES {
         let found = in_f32(&program(case.formula, SignForm::Exact), &grid());
         for (point, found) in grid().iter().zip(found) {
-            for (found, wanted) in found.iter().zip((case.truth)(point[0], point[1])) {
-                assert_near(*found, wanted, F32, case.formula);
-            }
+            let truth = (case.truth)(point[0], point[1]);
+            assert_all_near(&found, &truth, F32, case.formula);
         }
     }
 }
@@ -192,6 +186,7 @@ fn values_and_slopes_on_tensors() {
                 }
             }
             for (k, found) in found.iter().enumerate() {
+                // A constant has one value for all rows.
                 for (found, wanted) in found.iter().zip(column(&truth, k)) {
                     assert_near(*found, wanted, F32, &format!("{} ({k})", case.formula));
                 }
@@ -207,9 +202,7 @@ fn a_smooth_sign_is_a_tanh_of_its_width() {
         let (x, y) = (point[0], point[1]);
         let tanh = ((x - 0.8) / 0.2).tanh();
         let wanted = [y * tanh, y * (1.0 - tanh * tanh) / 0.2, tanh];
-        for (found, wanted) in program.eval(&point).iter().zip(wanted) {
-            assert_near(*found, wanted, F64, "smooth sign");
-        }
+        assert_all_near(&program.eval(&point), &wanted, F64, "smooth sign");
     }
 }
 

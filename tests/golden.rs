@@ -4,14 +4,13 @@
 //! `tests/run --bless` rewrites them after an intended change; the difference is then part of the commit.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::Value;
 
 use crate::support::committed::{difference, is_as_committed, same_but_for_rounding};
-use crate::support::mechanisms::fixture;
-use crate::support::paths::{config, ours};
-use crate::support::{Scratch, answers, measured, succeeds, text};
+use crate::support::paths::ours;
+use crate::support::{Scratch, measured};
 
 /// Left out: values that depend on the machine, the time, the version and the paths; values that only draw the numbers;
 /// the settings, which are the same in all answers; and the errors with a network, which is trained in single
@@ -29,17 +28,13 @@ const LEFT_OUT: [&str; 10] = [
     "tried",
 ];
 
-/// Close the loop with these arguments, and compare the answer with the committed one of this name.
-fn answer_is_as_before(name: &str, arguments: &[&str]) {
-    let scratch = Scratch::new();
-    let out = scratch.out();
-    let usual = ["closeloop", "--quiet", "--seed", "1", "--out", &out];
-    answers(&[&usual, arguments].concat());
-    let read = |file: &str| fs::read_to_string(scratch.path("out").join(file)).unwrap();
-    let mut report: Value = serde_json::from_str(&read("report.json")).unwrap();
+/// Close the loop of a rig, as these words give it, and compare the answer with the committed one of this name.
+fn answer_is_as_before(scratch: &Scratch, name: &str, rig: &str) {
+    scratch.answers(&format!("closeloop --quiet --seed 1 --out out {rig}"));
+    let mut report = scratch.read_json("out/report.json");
     leave_out(&mut report);
     let report = lines(&report, 0) + "\n";
-    let model = read("model.toml");
+    let model = scratch.read("out/model.toml");
     let (_, model) = model.split_once('\n').unwrap(); // The first line has the version.
     let folder = ours("tests/golden").join(name);
     for (file, found) in [("report.json", report.as_str()), ("model.toml", model)] {
@@ -98,208 +93,172 @@ fn lines(value: &Value, depth: usize) -> String {
     format!("{open}\n{}\n{end}{close}", entries.join(",\n"))
 }
 
-/// Four logs of 6 s of a plant, the last of which is the test log; and the answer on them.
-fn simulated(name: &str, model: &str, plant: &str, effects: &[&str]) {
+/// Four logs of 6 s of a plant, the last of which is the test log; and the answer on them. Words for the plant's effects
+/// may follow it.
+fn simulated(name: &str, model: &str, plant: &str) {
     let scratch = Scratch::new();
-    let mut simulate = vec!["simulate", "--quiet", "--plant", plant, "--duration", "6"];
-    if !effects.is_empty() {
-        simulate.push("--effect");
-        simulate.extend(effects);
-    }
-    let log = |seed: &str| {
-        let log = text(&scratch.path(&format!("run{seed}.csv"))).to_owned();
-        succeeds(&[&simulate[..], &["--seed", seed, "--out", &log]].concat());
-        log
-    };
-    let [a, b, c, test] = ["1", "2", "3", "4"].map(log);
-    let logs = ["--model", model, "--train", &a, &b, &c, "--test", &test];
-    answer_is_as_before(name, &logs);
+    scratch.simulates(&format!("{plant} --quiet --duration 6"), &[1, 2, 3, 4]);
+    let logs = "--train run1.csv run2.csv run3.csv --test run4.csv";
+    answer_is_as_before(&scratch, name, &format!("--model {model} {logs}"));
 }
 
-/// A committed log.
-fn small(name: &str) -> String {
-    text(&ours("tests/fixtures/logs").join(name)).to_owned()
+/// A file of the folder of committed logs.
+fn small(name: &str) -> PathBuf {
+    ours("tests/fixtures/logs").join(name)
 }
 
 /// The two-link arm whose log is committed.
-fn small_arm_model(scratch: &Scratch) -> String {
-    let (urdf, model) = (fixture("planar_2r.urdf"), scratch.path("planar_2r.toml"));
-    let from = ["new", "--quiet", "--from-urdf", text(&urdf)];
-    succeeds(&[&from[..], &["--out", text(&model)]].concat());
-    text(&model).to_owned()
+fn write_small_arm(scratch: &Scratch) {
+    let urdf = "$REPO/tests/fixtures/mechanisms/planar_2r.urdf";
+    scratch.succeeds(&format!(
+        "new --quiet --from-urdf {urdf} --out planar_2r.toml"
+    ));
 }
 
 /// The answer for a committed log.
-fn of_small_log(name: &str, log: &str, model: &str) {
-    answer_is_as_before(name, &["--model", model, "--train", &small(log)]);
+fn of_small_log(scratch: &Scratch, rig: &str, model: &str) {
+    let log = format!("$REPO/tests/fixtures/logs/{rig}.csv");
+    let given = format!("--model {model} --train {log}");
+    answer_is_as_before(scratch, &format!("small_{rig}"), &given);
 }
 
 #[test]
 fn small_pendulum() {
-    of_small_log("small_pendulum", "pendulum.csv", "pendulum");
+    of_small_log(&Scratch::new(), "pendulum", "pendulum");
 }
 
 #[test]
 fn small_servo() {
-    of_small_log("small_servo", "servo.csv", "servo");
+    of_small_log(&Scratch::new(), "servo", "servo");
 }
 
 #[test]
 fn small_arm() {
     let scratch = Scratch::new();
-    of_small_log("small_arm", "arm.csv", &small_arm_model(&scratch));
+    write_small_arm(&scratch);
+    of_small_log(&scratch, "arm", "planar_2r.toml");
 }
 
 #[test]
 fn the_committed_logs_are_what_their_plants_write() {
     let scratch = Scratch::new();
-    small_arm_model(&scratch);
+    write_small_arm(&scratch);
     for name in ["pendulum", "servo", "arm"] {
-        let plant = fs::read_to_string(small(&format!("{name}.toml"))).unwrap();
-        let plant = scratch.file(&format!("{name}.toml"), plant);
-        let log = scratch.path(&format!("{name}.csv"));
-        let simulate = ["simulate", "--quiet", "--plant", &plant, "--seed", "1"];
-        succeeds(&[&simulate[..], &["--out", text(&log)]].concat());
-        let found = fs::read_to_string(log).unwrap();
-        let committed = small(&format!("{name}.csv"));
-        is_as_committed(committed.as_ref(), &found, same_but_for_rounding);
+        let [plant, log] = ["toml", "csv"].map(|kind| format!("{name}.{kind}"));
+        fs::copy(small(&plant), scratch.path(&plant)).unwrap();
+        let simulate = format!("simulate --quiet --plant {plant} --seed 1 --out {log}");
+        scratch.succeeds(&simulate);
+        is_as_committed(&small(&log), &scratch.read(&log), same_but_for_rounding);
     }
 }
 
 #[test]
 fn demo() {
-    answer_is_as_before("demo", &[]);
+    answer_is_as_before(&Scratch::new(), "demo", "");
+}
+
+/// A pendulum with effects that its model does not declare.
+fn pendulum_with(name: &str, effects: &str) {
+    let plant = format!("pendulum --effect {effects}");
+    simulated(&format!("pendulum_with_{name}"), "pendulum", &plant);
 }
 
 #[test]
 fn pendulum_with_dry_friction() {
-    simulated(
-        "pendulum_with_dry_friction",
-        "pendulum",
-        "pendulum",
-        &["coulomb_friction=0.16"],
-    );
+    pendulum_with("dry_friction", "coulomb_friction=0.16");
 }
 
 #[test]
 fn pendulum_with_drag() {
-    simulated(
-        "pendulum_with_drag",
-        "pendulum",
-        "pendulum",
-        &["quadratic_drag=0.05"],
-    );
+    pendulum_with("drag", "quadratic_drag=0.05");
 }
 
 #[test]
 fn pendulum_with_two_kinds_of_friction() {
-    simulated(
-        "pendulum_with_two_kinds_of_friction",
-        "pendulum",
-        "pendulum",
-        &["coulomb_friction=0.12", "viscous_friction=0.05"],
+    pendulum_with(
+        "two_kinds_of_friction",
+        "coulomb_friction=0.12 viscous_friction=0.05",
     );
 }
 
 #[test]
 fn pendulum_with_a_delay() {
-    simulated(
-        "pendulum_with_a_delay",
-        "pendulum",
-        "pendulum",
-        &["actuator_delay=0.02"],
-    );
+    pendulum_with("a_delay", "actuator_delay=0.02");
 }
 
 #[test]
 fn servo() {
-    let plant = config("plants/servo-real.toml");
-    simulated("servo", "servo", &plant, &[]);
+    simulated("servo", "servo", "$REPO/configs/plants/servo-real.toml");
 }
 
 mod slow {
     use super::*;
 
+    /// An acrobot with effects that its model does not declare.
+    fn acrobot_with(name: &str, effects: &str) {
+        let plant = format!("acrobot --effect {effects}");
+        simulated(&format!("acrobot_with_{name}"), "acrobot", &plant);
+    }
+
     #[test]
     fn acrobot_with_dry_friction() {
-        simulated(
-            "acrobot_with_dry_friction",
-            "acrobot",
-            "acrobot",
-            &["coulomb_friction@2=0.15"],
-        );
+        acrobot_with("dry_friction", "coulomb_friction@2=0.15");
     }
 
     #[test]
     fn acrobot_with_friction_and_a_spring() {
-        simulated(
-            "acrobot_with_friction_and_a_spring",
-            "acrobot",
-            "acrobot",
-            &["viscous_friction@1=0.1", "joint_spring@2=0.4"],
+        acrobot_with(
+            "friction_and_a_spring",
+            "viscous_friction@1=0.1 joint_spring@2=0.4",
         );
     }
 
-    /// The paths of measured logs in a folder.
-    fn paths(folder: &Path, names: &[&str]) -> Vec<String> {
-        let path = |name: &&str| text(&folder.join(name)).to_owned();
-        names.iter().map(path).collect()
-    }
-
-    fn measured_rig(name: &str, set: &str, model: &str, train: &[&str], test: &[&str]) {
+    /// The answer for measured logs: the last is the test log where there are several.
+    fn measured_rig(scratch: &Scratch, name: &str, set: &str, model: &str, logs: &[&str]) {
         let Some(folder) = measured(set) else { return };
-        let [train, test] = [train, test].map(|names| paths(&folder, names));
-        let mut arguments = vec!["--model", model, "--train"];
-        arguments.extend(train.iter().map(String::as_str));
-        if !test.is_empty() {
-            arguments.push("--test");
-            arguments.extend(test.iter().map(String::as_str));
+        for log in logs {
+            fs::copy(folder.join(log), scratch.path(log)).unwrap();
         }
-        answer_is_as_before(name, &arguments);
+        let given = match logs {
+            [only] => format!("--train {only}"),
+            [train @ .., test] => format!("--train {} --test {test}", train.join(" ")),
+            [] => panic!("no logs"),
+        };
+        answer_is_as_before(scratch, name, &format!("--model {model} {given}"));
     }
 
     /// An arm from the URDF that lies next to its logs.
-    fn arm(name: &str, train: &[&str], test: &[&str]) {
+    fn arm(name: &str, logs: &[&str]) {
         let Some(folder) = measured(name) else { return };
         let scratch = Scratch::new();
-        let urdf = folder.join(format!("{name}.urdf"));
-        let model: PathBuf = scratch.path(&format!("{name}.toml"));
-        let from = ["new", "--from-urdf", text(&urdf), "--out", text(&model)];
-        succeeds(&from);
-        measured_rig(name, name, text(&model), train, test);
+        scratch.new_model(&folder.join(format!("{name}.urdf")));
+        let model = format!("{name}.toml");
+        fs::rename(scratch.path("model.toml"), scratch.path(&model)).unwrap();
+        measured_rig(&scratch, name, name, &model, logs);
     }
 
     #[test]
     fn panda() {
-        arm("panda", &["exciting_trajectory.csv"], &[]);
+        arm("panda", &["exciting_trajectory.csv"]);
     }
 
     #[test]
     fn kuka_lwr4() {
-        let (train, test) = (["measurements_1.csv"], ["measurements_2.csv"]);
-        arm("kuka_lwr4", &train, &test);
+        arm("kuka_lwr4", &["measurements_1.csv", "measurements_2.csv"]);
     }
 
     #[test]
     fn dfki_simple_pendulum() {
-        measured_rig(
-            "dfki_simple_pendulum",
-            "dfki_simple_pendulum",
-            "pendulum",
-            &["ddp_pd_tracking.csv"],
-            &["direct_collocation_pd_tracking.csv"],
-        );
+        let name = "dfki_simple_pendulum";
+        let logs = ["ddp_pd_tracking.csv", "direct_collocation_pd_tracking.csv"];
+        measured_rig(&Scratch::new(), name, name, "pendulum", &logs);
     }
 
     #[test]
     fn dfki_double_pendulum() {
-        let model = ours("docs/rigs/dfki_double_pendulum.toml");
-        measured_rig(
-            "dfki_double_pendulum",
-            "dfki_double_pendulum_c0",
-            text(&model),
-            &["sysid_00.csv", "sysid_03.csv"],
-            &["sysid_05.csv"],
-        );
+        let model = "$REPO/docs/rigs/dfki_double_pendulum.toml";
+        let logs = ["sysid_00.csv", "sysid_03.csv", "sysid_05.csv"];
+        let (name, set) = ("dfki_double_pendulum", "dfki_double_pendulum_c0");
+        measured_rig(&Scratch::new(), name, set, model, &logs);
     }
 }

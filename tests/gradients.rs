@@ -7,7 +7,7 @@ use residyn_core::model::Dynamics;
 use residyn_train::replay;
 
 use crate::support::catalogue::{
-    Case, assert_near, catalog, column, in_f32, jacobian, point, points, rng,
+    Case, assert_all_near, assert_near, catalog, column, in_f32, jacobian, point, points, rng,
 };
 use crate::support::tensors::{devices, numbers, tensor};
 
@@ -90,9 +90,7 @@ fn gradients_in_f32_lanes_agree_with_f64() {
         let jacobian = jacobian(&case.dynamics);
         let points = points(&case.dynamics, ROWS, k as u64);
         for (point, found) in points.iter().zip(in_f32(&jacobian, &points)) {
-            for (found, wanted) in found.into_iter().zip(jacobian.eval(point)) {
-                assert_near(found, wanted, F32, &case.name);
-            }
+            assert_all_near(&found, &jacobian.eval(point), F32, &case.name);
         }
     }
 }
@@ -135,19 +133,12 @@ fn check_burn(case: &Case, points: &[Vec<f64>], joint: usize, device: &Device) {
             .map_or(vec![0.0; input.dims()[0]], numbers);
         let what = format!("{} by {}", case.name, case.dynamics.program.inputs()[k]);
         if found.len() == ROWS {
-            found
-                .iter()
-                .zip(wanted)
-                .for_each(|(f, w)| assert_near(*f, w, F32, &what));
+            assert_all_near(&found, &wanted, F32, &what);
         } else {
             // The rounding of a sum is measured relative to its terms.
             let size: f64 = wanted.iter().map(|w| w.abs()).sum::<f64>().max(1.0);
-            assert_near(
-                found[0] / size,
-                wanted.iter().sum::<f64>() / size,
-                F32,
-                &what,
-            );
+            let sum: f64 = wanted.iter().sum();
+            assert_near(found[0] / size, sum / size, F32, &what);
         }
     }
 }

@@ -6,9 +6,9 @@ use residyn_core::expr::SignForm;
 use residyn_core::identify::{
     Fit, Identifiability, Shooting, Values, Window, cut, fit, identifiability, uncertainty,
 };
-use residyn_core::model::{Dynamics, Library};
+use residyn_core::model::Dynamics;
 
-use crate::support::catalogue::{assert_near, dynamics, fitted, rng, system};
+use crate::support::catalogue::{assert_near, dynamics, effect, rng, system};
 use crate::support::logs::{add_noise, simulate};
 
 /// Windows in s.
@@ -88,13 +88,11 @@ fn parameters_of_noise_free_logs_are_recovered() {
 
 #[test]
 fn parameters_of_effects_are_recovered() {
-    let library = Library::built_in();
-    let effect = |name: &str, values: &[f64]| fitted(library.effect(name).unwrap(), 0, values);
     let effects = [
-        effect("viscous_friction", &[0.05]),
-        effect("coulomb_friction", &[0.15]),
-        effect("constant_torque", &[0.2]),
-        effect("gravity_tilt", &[0.05]),
+        effect("viscous_friction", 0, &[0.05]),
+        effect("coulomb_friction", 0, &[0.15]),
+        effect("constant_torque", 0, &[0.2]),
+        effect("gravity_tilt", 0, &[0.05]),
     ];
     let model = dynamics(
         &system("pendulum"),
@@ -189,8 +187,7 @@ fn covered(model: &Dynamics, clean: &Log, seed: u64) -> (Vec<bool>, f64) {
 #[test]
 fn intervals_have_their_nominal_coverage() {
     const SEEDS: usize = 60;
-    let library = Library::built_in();
-    let friction = fitted(library.effect("viscous_friction").unwrap(), 0, &[0.05]);
+    let friction = effect("viscous_friction", 0, &[0.05]);
     let model = dynamics(&system("pendulum"), &[friction], SignForm::Exact);
     // It hangs at first, and never comes near upright.
     let clean = simulate(&model, &[3.0, 0.0], 1.0, 2000, 5);
@@ -228,8 +225,7 @@ fn offset_logs(model: &Dynamics, seed: u64) -> Vec<Log> {
 #[test]
 fn offsets_are_recovered_per_log_with_nominal_coverage() {
     const SEEDS: u64 = 40;
-    let library = Library::built_in();
-    let offset = fitted(library.effect("sensor_offset").unwrap(), 0, &[0.0]);
+    let offset = effect("sensor_offset", 0, &[0.0]);
     let pendulum = system("pendulum");
     let rig = dynamics(&pendulum, &[], SignForm::Exact);
     let model = dynamics(&pendulum, &[offset], SignForm::Exact);
@@ -259,8 +255,7 @@ fn offsets_are_recovered_per_log_with_nominal_coverage() {
 
 #[test]
 fn a_log_without_windows_has_no_value_of_its_own() {
-    let library = Library::built_in();
-    let offset = fitted(library.effect("sensor_offset").unwrap(), 0, &[0.0]);
+    let offset = effect("sensor_offset", 0, &[0.0]);
     let pendulum = system("pendulum");
     let mut logs = offset_logs(&dynamics(&pendulum, &[], SignForm::Exact), 1);
     logs[1].leave_out.push(Interval {

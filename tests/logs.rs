@@ -25,7 +25,8 @@ use serde_json::Value;
 
 use crate::support::catalogue::{catalog, rng};
 use crate::support::logs::simulate;
-use crate::support::{measured, refuses, residyn, succeeds, text};
+use crate::support::tables::rows;
+use crate::support::{Scratch, measured, says};
 
 /// A pendulum with dry friction, thrown so that it turns over.
 const RIG: &str = r#"
@@ -52,56 +53,36 @@ fn recorded(name: &str, seed: u64) -> Log {
     log
 }
 
-/// A folder with the rig's log, changed, and the model with its declared values.
-struct Desk {
-    folder: tempfile::TempDir,
+/// A folder with the rig's log, `run.csv`, changed.
+fn desk(change: impl Fn(&mut Log)) -> Scratch {
+    let scratch = Scratch::new();
+    let mut log = recorded("run.csv", 0);
+    change(&mut log);
+    write_log(&log, scratch.path("run.csv")).unwrap();
+    scratch
 }
 
-impl Desk {
-    fn with(change: impl Fn(&mut Log)) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let mut log = recorded("run.csv", 0);
-        change(&mut log);
-        write_log(&log, folder.path().join("run.csv")).unwrap();
-        Self { folder }
-    }
+/// A model file of the pendulum, with its declared values and these lines under `[columns]`.
+fn write_model(desk: &Scratch, columns: &[String]) {
+    let system = include_str!("../models/pendulum.toml");
+    let system = system
+        .replace("15.0", "-17.4")
+        .replace("3.0, unit", "4.6, unit");
+    let columns = columns.join("\n");
+    desk.file("model.toml", format!("{system}\n[columns]\n{columns}\n"));
+}
 
-    fn path(&self, name: &str) -> String {
-        text(&self.folder.path().join(name)).to_owned()
-    }
+const CLOSELOOP: &str = "closeloop --json --model pendulum --train run.csv --out out";
 
-    /// A model file of the pendulum with these lines under `[columns]`.
-    fn model(&self, columns: &[String]) -> String {
-        let system = include_str!("../models/pendulum.toml");
-        let system = system
-            .replace("15.0", "-17.4")
-            .replace("3.0, unit", "4.6, unit");
-        let file = format!("{system}\n[columns]\n{}\n", columns.join("\n"));
-        let path = self.path("model.toml");
-        fs::write(&path, file).unwrap();
-        path
-    }
-
-    /// The result of closing the loop on the log.
-    fn closed<T>(&self, run: impl Fn(&[&str]) -> T) -> T {
-        let (log, out) = (self.path("run.csv"), self.path("out"));
-        let rig = ["--model", "pendulum", "--train", &log, "--out", &out];
-        run(&[["closeloop", "--json"].as_slice(), &rig].concat())
-    }
-
-    /// The findings of this severity from `residyn audit`, whose exit status must say whether some are serious.
-    fn findings(&self, severity: &str, model: Option<&str>) -> Vec<Value> {
-        let log = self.path("run.csv");
-        let model = model.map_or(vec![], |model| vec!["--model", model]);
-        let arguments = [vec!["audit", "--json", &log], model].concat();
-        let output = residyn(&arguments);
-        let audits: Value = serde_json::from_slice(&output.stdout).unwrap();
-        let all = audits[0]["findings"].as_array().unwrap().clone();
-        let serious = all.iter().any(|finding| finding["severity"] == "serious");
-        assert_eq!(output.status.code(), Some(i32::from(serious)));
-        let of_severity = |finding: &Value| finding["severity"] == severity;
-        all.into_iter().filter(of_severity).collect()
-    }
+/// The findings of this severity from `residyn audit`, whose exit status must say whether some are serious.
+fn findings(desk: &Scratch, severity: &str, flags: &str) -> Vec<Value> {
+    let output = desk.run(&format!("audit --json run.csv {flags}"));
+    let audits: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let all = audits[0]["findings"].as_array().unwrap().clone();
+    let serious = all.iter().any(|finding| finding["severity"] == "serious");
+    assert_eq!(output.status.code(), Some(i32::from(serious)));
+    let of_severity = |finding: &Value| finding["severity"] == severity;
+    all.into_iter().filter(of_severity).collect()
 }
 
 /// Lines to paste: `remedy` of all findings under one key.
@@ -125,83 +106,54 @@ fn within_turn(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 
-/// What a logger does to a log, and words of the finding that names the fault.
-type Case = (fn(&mut Log), &'static str);
+/// What a logger does to the columns of a log: a factor, or turns that are not counted; and words of the finding that
+/// names the fault.
+const MISREAD: &str = "
+time 1e3                      | the time looks like ms
+time 1e6                      | the time looks like us
+time 1e9                      | the time looks like ns
+tau -1                        | tau1 has the opposite sign
+qd -1                         | qd1 follows -dq1/dt
+q deg                         | q1 looks like deg
+qd deg                        | qd1 looks like deg/s
+qd rpm                        | qd1 looks like rpm
+q deg, qd deg                 | q1 and qd1 look like deg and deg/s
+q turn                        | q1 jumps by a full turn (6.28
+q turn, q deg                 | q1 jumps by a full turn (360)
+qd 0                          | qd1 is 0 rad/s throughout
+time 1e6, q turn, tau -1      | the time looks like us
+q -1, qd -1                   | tau1
+";
 
-const MISREAD: [Case; 14] = [
-    (
-        |log| each(&mut log.time, |t| 1e3 * t),
-        "the time looks like ms",
-    ),
-    (
-        |log| each(&mut log.time, |t| 1e6 * t),
-        "the time looks like us",
-    ),
-    (
-        |log| each(&mut log.time, |t| 1e9 * t),
-        "the time looks like ns",
-    ),
-    (
-        |log| each(&mut log.tau[0], |tau| -tau),
-        "tau1 has the opposite sign",
-    ),
-    (|log| each(&mut log.qd[0], |qd| -qd), "qd1 follows -dq1/dt"),
-    (
-        |log| each(&mut log.q[0], f64::to_degrees),
-        "q1 looks like deg",
-    ),
-    (
-        |log| each(&mut log.qd[0], f64::to_degrees),
-        "qd1 looks like deg/s",
-    ),
-    (
-        |log| each(&mut log.qd[0], |qd| 30.0 / PI * qd),
-        "qd1 looks like rpm",
-    ),
-    (
-        |log| {
-            each(&mut log.q[0], f64::to_degrees);
-            each(&mut log.qd[0], f64::to_degrees);
-        },
-        "q1 and qd1 look like deg and deg/s",
-    ),
-    (
-        |log| each(&mut log.q[0], within_turn),
-        "q1 jumps by a full turn (6.28",
-    ),
-    (
-        |log| each(&mut log.q[0], |q| within_turn(q).to_degrees()),
-        "q1 jumps by a full turn (360)",
-    ),
-    (|log| log.qd[0].fill(0.0), "qd1 is 0 rad/s throughout"),
-    (
-        |log| {
-            each(&mut log.time, |t| 1e6 * t);
-            each(&mut log.q[0], within_turn);
-            each(&mut log.tau[0], |tau| -tau);
-        },
-        "the time looks like us",
-    ),
-    (
-        |log| {
-            each(&mut log.q[0], |q| -q);
-            each(&mut log.qd[0], |qd| -qd);
-        },
-        "tau1",
-    ),
-];
+fn misread(log: &mut Log, faults: &str) {
+    for fault in faults.split(", ") {
+        let (column, what) = fault.split_once(' ').unwrap();
+        let values = match column {
+            "time" => &mut log.time,
+            "q" => &mut log.q[0],
+            "qd" => &mut log.qd[0],
+            _ => &mut log.tau[0],
+        };
+        let scale = |factor: f64| move |value: f64| factor * value + 0.0;
+        match what {
+            "turn" => each(values, within_turn),
+            "deg" => each(values, f64::to_degrees),
+            "rpm" => each(values, scale(30.0 / PI)),
+            factor => each(values, scale(factor.parse().unwrap())),
+        }
+    }
+}
 
 #[test]
 fn what_is_misread_is_named_and_mended_by_the_lines_to_paste() {
-    let good = Desk::with(|_| {});
-    assert_eq!(good.findings("serious", None), Vec::<Value>::new());
-    for (change, words) in MISREAD {
-        let desk = Desk::with(change);
-        let serious = desk.findings("serious", None);
-        let named = |finding: &Value| finding["text"].as_str().unwrap().contains(words);
+    assert!(findings(&desk(|_| {}), "serious", "").is_empty());
+    for [faults, words] in rows(MISREAD) {
+        let desk = desk(|log| misread(log, &faults));
+        let serious = findings(&desk, "serious", "");
+        let named = |finding: &Value| finding["text"].as_str().unwrap().contains(&words);
         assert!(serious.iter().any(named), "{words}: {serious:#?}");
-        let model = desk.model(&remedies(&serious, "columns"));
-        let left = desk.findings("serious", Some(&model));
+        write_model(&desk, &remedies(&serious, "columns"));
+        let left = findings(&desk, "serious", "--model model.toml");
         assert!(left.is_empty(), "{words}: {left:#?}");
     }
 }
@@ -209,13 +161,14 @@ fn what_is_misread_is_named_and_mended_by_the_lines_to_paste() {
 /// The corrected log is the intended one.
 #[test]
 fn pasted_lines_give_back_the_log() {
-    let desk = Desk::with(|log| {
+    let desk = desk(|log| {
         each(&mut log.time, |t| 1e9 * t);
         each(&mut log.q[0], |q| within_turn(q).to_degrees());
         each(&mut log.tau[0], |tau| -tau);
     });
-    let lines = remedies(&desk.findings("serious", None), "columns");
-    let model = read_model(Path::new(&desk.model(&lines)), &Library::built_in());
+    let lines = remedies(&findings(&desk, "serious", ""), "columns");
+    write_model(&desk, &lines);
+    let model = read_model(desk.path("model.toml"), &Library::built_in());
     let read = read_rig_log(desk.path("run.csv"), 1, &model.unwrap().columns).unwrap();
     let meant = recorded("run.csv", 0);
     let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
@@ -225,28 +178,22 @@ fn pasted_lines_give_back_the_log() {
 
 #[test]
 fn a_clock_in_nanoseconds_is_refused_at_once_with_its_line() {
-    let desk = Desk::with(|log| each(&mut log.time, |t| 1e9 * t));
-    let message = desk.closed(refuses);
+    let desk = desk(|log| each(&mut log.time, |t| 1e9 * t));
     let line = r#"[columns] time = { column = "time", unit = "ns" }"#;
-    assert!(message.contains(line), "{message}");
+    says(&desk.refuses(CLOSELOOP), &[line]);
 }
 
 #[test]
 fn velocities_come_from_the_angles_where_a_log_has_none() {
-    let desk = Desk::with(|_| {});
-    let path = desk.path("run.csv");
+    let desk = desk(|_| {});
     let without = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();
         [cells[0], cells[1], cells[3]].join(",") + "\n"
     };
-    let text: String = fs::read_to_string(&path)
-        .unwrap()
-        .lines()
-        .map(without)
-        .collect();
-    fs::write(&path, text).unwrap();
-    assert!(desk.findings("serious", None).is_empty());
-    let read = read_standard_log(&path).unwrap();
+    let text: String = desk.read("run.csv").lines().map(without).collect();
+    let path = desk.file("run.csv", text);
+    assert!(findings(&desk, "serious", "").is_empty());
+    let read = read_standard_log(path).unwrap();
     let exact = recorded("run.csv", 0);
     let off = read.qd[0]
         .iter()
@@ -259,18 +206,13 @@ fn velocities_come_from_the_angles_where_a_log_has_none() {
 
 #[test]
 fn a_reading_that_jumps_is_placed_and_can_be_left_out() {
-    let desk = Desk::with(|log| log.q[0][600] += 50.0);
-    let warnings = desk.findings("warning", None);
+    let desk = desk(|log| log.q[0][600] += 50.0);
+    let warnings = findings(&desk, "warning", "");
     let spans = remedies(&warnings, "leave_out");
     assert_eq!(spans, ["run.csv@5.995-6.045"], "{warnings:#?}");
-    let (model, log) = (desk.model(&[]), desk.path("run.csv"));
-    let error = |more: &[&str]| -> f64 {
-        let arguments = ["evaluate", "--json", "--horizon", "0.5", "--model", &model];
-        let all = [&arguments[..], &["--test", &log], more].concat();
-        let found: Value = serde_json::from_str(&succeeds(&all)).unwrap();
-        found["position_rmse"][0][0].as_f64().unwrap()
-    };
-    let (with, without) = (error(&[]), error(&["--leave-out", &spans[0]]));
+    write_model(&desk, &[]);
+    let error = |more: &str| desk.evaluated(&format!("--model model.toml --test run.csv {more}"));
+    let (with, without) = (error(""), error(&format!("--leave-out {}", spans[0])));
     assert!(with > 1.0 && without < 0.3, "{with} {without}");
 }
 
@@ -392,23 +334,18 @@ fn a_rig_at_rest_is_inconclusive() {
         |row| 0.3 + 1.5e-3 * f64::from(u8::from((row * 7919) % 10 == 0)),
     ];
     for angle in still {
-        let desk = Desk::with(|log| {
+        let desk = desk(|log| {
             (0..log.rows()).for_each(|row| log.q[0][row] = angle(row));
             log.qd[0].fill(0.0);
             log.tau[0].fill(0.1);
         });
-        let output = desk.closed(residyn);
+        let output = desk.run(CLOSELOOP);
         let errors = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{errors}");
-        assert!(errors.contains("joint 1 moves by"), "{errors}");
+        says(&errors, &["joint 1 moves by"]);
         let report: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(report["verdict"], "inconclusive");
-        assert!(
-            report["reason"]
-                .as_str()
-                .unwrap()
-                .contains("no joint moves")
-        );
+        says(report["reason"].as_str().unwrap(), &["no joint moves"]);
         assert_eq!(report["effects"], Value::Array(vec![]));
     }
 }
@@ -443,14 +380,13 @@ fn one_short_log_is_split_so_that_it_can_be_judged() {
 
 #[test]
 fn a_log_too_short_for_any_test_says_what_to_give() {
-    let desk = Desk::with(|log| *log = thinned(log, |row| row > 60));
-    let message = desk.closed(refuses);
-    assert!(message.contains("--test"), "{message}");
+    let desk = desk(|log| *log = thinned(log, |row| row > 60));
+    says(&desk.refuses(CLOSELOOP), &["--test"]);
 }
 
 #[test]
 fn a_log_may_come_from_standard_input() {
-    let desk = Desk::with(|_| ());
+    let desk = desk(|_| ());
     let piped = fs::File::open(desk.path("run.csv")).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_residyn"));
     let output = command.args(["audit", "--json", "-"]).stdin(piped).output();

@@ -6,18 +6,18 @@ use residyn_core::expr::SignForm;
 use residyn_core::model::Dynamics;
 use residyn_core::model::chain::{Chain, model_text};
 
-use crate::support::catalogue::{dynamics, points};
-use crate::support::mechanisms::{comparable, fixture, format_of, mujoco_agrees, read, system};
-use crate::support::{refuses, residyn, succeeds, text};
+use crate::support::catalogue::{assert_energy_balanced, dynamics, points};
+use crate::support::mechanisms::{
+    FILES, comparable, fixture, format_of, mujoco_agrees, read, read_to, system,
+};
+use crate::support::tables::{rows, says_words};
+use crate::support::{Scratch, replaced, says};
 
-const FILES: [&str; 6] = [
-    "planar_2r.urdf",
-    "rounded_2r.urdf",
-    "spatial_3r.urdf",
-    "rp.xml",
-    "prr.xml",
-    "geoms.xml",
-];
+/// Every joint of these moves on its own.
+fn independent() -> impl Iterator<Item = &'static str> {
+    let alone = FILES.into_iter().filter(|(_, tip)| tip.is_none());
+    alone.map(|(name, _)| name)
+}
 
 fn chain(name: &str) -> Chain {
     read(&fixture(name))
@@ -33,20 +33,15 @@ fn states(model: &Dynamics, count: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// Also if a joint follows another.
 #[test]
 fn energy_changes_by_the_power() {
-    for name in FILES {
-        let system = system(&chain(name));
+    for (name, tip) in FILES {
+        let system = system(&read_to(&fixture(name), tip));
         let model = dynamics(&system, &[], SignForm::Exact);
-        let program = system.energy_program().unwrap();
-        for point in states(&model, 200) {
-            let (rates, energy) = (model.program.eval(&point), program.eval(&point));
-            let parts: Vec<f64> = energy[2..].iter().zip(&rates).map(|(s, r)| s * r).collect();
-            let size: f64 = parts.iter().map(|part| part.abs()).sum();
-            let off = parts.iter().sum::<f64>() - energy[1];
-            // Coefficients are rounded to 15 digits.
-            assert!(off.abs() <= 1e-12 * size, "{name}: {off:e} of {size}");
-        }
+        let energy = system.energy_program().unwrap();
+        // Coefficients are rounded to 15 digits.
+        assert_energy_balanced(&model, &energy, &states(&model, 200), 1e-12);
     }
 }
 
@@ -67,7 +62,7 @@ fn inverse_mass(model: &Dynamics, point: &[f64]) -> nalgebra::DMatrix<f64> {
 
 #[test]
 fn the_mass_matrix_is_symmetric_and_positive() {
-    for name in FILES {
+    for name in independent() {
         let model = dynamics(&system(&chain(name)), &[], SignForm::Exact);
         for mut point in states(&model, 100) {
             point[model.joints..2 * model.joints].fill(0.0);
@@ -83,7 +78,7 @@ fn the_mass_matrix_is_symmetric_and_positive() {
 /// A change of one parameter cannot be compensated by the others: the derivatives of the torques are independent.
 #[test]
 fn base_parameters_are_linearly_independent() {
-    for name in FILES {
+    for name in independent() {
         let system = system(&chain(name));
         let model = comparable(&system);
         let n = model.joints;
@@ -150,226 +145,78 @@ fn properties_that_are_not_carried_are_noted() {
             "line 21: `ctrlrange` from -3 to 2 is not symmetric and is not carried",
         ]
     );
-    let output = residyn(&["new", "--from-mjcf", text(&fixture("geoms.xml"))]);
+    let output = Scratch::new().run("new --from-mjcf $REPO/tests/fixtures/mechanisms/geoms.xml");
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        said.contains("note: line 20: contacts are not carried\n"),
-        "{said}"
-    );
+    says(&said, &["note: line 20: contacts are not carried\n"]);
 }
 
 #[test]
 fn new_writes_a_model_file_that_other_commands_read() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("arm.toml");
-    let file = fixture("planar_2r.urdf");
-    let said = succeeds(&["new", "--from-urdf", text(&file), "--out", text(&out)]);
-    assert!(
-        said.ends_with("arm.toml: model of planar_2r, joints: 2\n"),
-        "{said}"
-    );
-    let json = succeeds(&["new", "--from-urdf", text(&file), "--json"]);
-    let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let scratch = Scratch::new();
+    let new = "new --from-urdf $REPO/tests/fixtures/mechanisms/planar_2r.urdf";
+    let said = scratch.succeeds(&format!("{new} --out arm.toml"));
+    let end = "arm.toml: model of planar_2r, joints: 2\n";
+    assert!(said.ends_with(end), "{said}");
+    let value = scratch.json(new);
     assert_eq!(value["joints"], 2);
-    assert_eq!(value["model"], fs::read_to_string(&out).unwrap());
+    assert_eq!(value["model"], scratch.read("arm.toml"));
     assert_eq!(value["notes"].as_array().unwrap().len(), 2);
-    let log = folder.path().join("log.csv");
-    succeeds(&[
-        "simulate",
-        "--plant",
-        text(&out),
-        "--duration",
-        "3",
-        "--out",
-        text(&log),
-    ]);
-    succeeds(&["evaluate", "--model", text(&out), "--test", text(&log)]);
+    scratch.succeeds("simulate --plant arm.toml --duration 3 --out log.csv");
+    scratch.succeeds("evaluate --model arm.toml --test log.csv");
 }
 
-/// The command's message for a fixture with one change.
-fn message(name: &str, from: &str, to: &str) -> String {
-    let contents = fs::read_to_string(fixture(name)).unwrap();
-    assert!(contents.contains(from), "{name} has no {from}");
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join(name);
-    fs::write(&file, contents.replacen(from, to, 1)).unwrap();
-    let source = format!("--from-{}", format_of(&file).name);
-    let out = folder.path().join("model.toml");
-    let message = refuses(&["new", &source, text(&file), "--out", text(&out)]);
-    assert!(!out.exists(), "a file was left behind");
-    message
-}
+/// A fixture, one of its texts, what stands there instead, and words of the message.
+const REFUSED: &str = r#"
+planar_2r.urdf | type="continuous"       | type="floating"                    | planar_2r.urdf, line 20, column 29 ... `elbow` ... `floating` ... fix the joint
+planar_2r.urdf | <limit lower            | <mimic joint="elbo"/><limit lower  | line 5, column 3 ... `shoulder` follows `elbo` ... fix the joint
+planar_2r.urdf | <parent link="upper"/>  | <parent link="uper"/>              | line 21, column 19 ... no link `uper`
+planar_2r.urdf | <child link="fore"/>    | <child link="upper"/>              | line 20, column 3 ... closes a loop ... open the loop
+planar_2r.urdf | <child link="upper"/>   | <child link="base"/>               | loop
+planar_2r.urdf | </robot>                | <link name="x"/></robot>           | line 34 ... second link
+planar_2r.urdf | </robot> | <link name="x"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link><joint name="j" type="revolute"><parent link="upper"/><child link="x"/></joint></robot> | line 34 ... branches ... `fore` and `x` ... such as `upper`
+planar_2r.urdf | value="0.8"             | value="${m}"                       | line 30, column 20 ... not a number ... xacro
+planar_2r.urdf | value="0.8"             | value="-0.8"                       | line 31 ... mass of `fore` ... above zero
+planar_2r.urdf | izz="0.001"             | izz="0.1"                          | line 31 ... `fore` ... sum of the others
+planar_2r.urdf | xyz="0 1 0"             | xyz="0 1"                          | line 9, column 16 ... takes 3 numbers, found 2
+planar_2r.urdf | damping="0.02"          | damping="-1"                       | line 25, column 24 ... give zero or a positive number
+planar_2r.urdf | </robot>                |                                    | not valid XML
+prr.xml        | type="slide"            | type="ball"                        | prr.xml, line 7 ... `ball` ... hinge and slide
+prr.xml        | <joint name="rail"      | <freejoint/><joint name="rail"     | line 7 ... remove it
+prr.xml        | armature="0.003"/>\n          <inertial pos="0 0 -0.2" mass="0.3" diaginertia="0.006 0.006 0.0004" xyaxes="1 0.1 0 0 1 0.3"/> | /> | line 13 ... `end` moves nothing that has inertia ... <inertial>
+prr.xml        | stiffness="1.5"         | stiffness="1 2"                    | line 10 ... polynomial
+prr.xml        | <actuator>              | <equality><joint joint1="end"/></equality><actuator> | line 19 ... closes a loop ... remove
+geoms.xml      | type="ellipsoid"        | type="mesh"                        | line 29 ... mesh ... <inertial> in body `hand`
+geoms.xml      | class="main"            | class="mein"                       | line 22 ... no default class `mein`
+geoms.xml      | autolimits="true"       | boundmass="1"                      | line 3 ... `boundmass ... give the masses
+geoms.xml      | <option                 | <option><flag damper="disable"/></option><option | line 4 ... `damper` is switched off
+geoms.xml      | zaxis="0.1 0.2 1"       | zaxis="0.1 0.2 1" euler="0 0 1"    | line 21 ... second orientation
+"#;
 
 #[test]
 fn anything_but_a_serial_chain_is_refused_with_place_and_remedy() {
-    let cases: &[(&str, &str, &str, &[&str])] = &[
-        (
-            "planar_2r.urdf",
-            "type=\"continuous\"",
-            "type=\"floating\"",
-            &[
-                "planar_2r.urdf, line 20, column 29",
-                "`elbow`",
-                "`floating`",
-                "fix the joint",
-            ],
-        ),
-        (
-            "planar_2r.urdf",
-            "<limit lower",
-            "<mimic joint=\"elbo\"/><limit lower",
-            &[
-                "line 5, column 3",
-                "`shoulder` follows `elbo`",
-                "fix the joint",
-            ],
-        ),
-        (
-            "planar_2r.urdf",
-            "<parent link=\"upper\"/>",
-            "<parent link=\"uper\"/>",
-            &["line 21, column 19", "no link `uper`"],
-        ),
-        (
-            "planar_2r.urdf",
-            "<child link=\"fore\"/>",
-            "<child link=\"upper\"/>",
-            &["line 20, column 3", "closes a loop", "open the loop"],
-        ),
-        (
-            "planar_2r.urdf",
-            "<child link=\"upper\"/>",
-            "<child link=\"base\"/>",
-            &["loop"],
-        ),
-        (
-            "planar_2r.urdf",
-            "</robot>",
-            "<link name=\"x\"/></robot>",
-            &["line 34", "second link"],
-        ),
-        (
-            "planar_2r.urdf",
-            "</robot>",
-            "<link name=\"x\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial></link><joint name=\"j\" type=\"revolute\"><parent link=\"upper\"/><child link=\"x\"/></joint></robot>",
-            &["line 34", "branches", "`fore` and `x`", "such as `upper`"],
-        ),
-        (
-            "planar_2r.urdf",
-            "value=\"0.8\"",
-            "value=\"${m}\"",
-            &["line 30, column 20", "not a number", "xacro"],
-        ),
-        (
-            "planar_2r.urdf",
-            "value=\"0.8\"",
-            "value=\"-0.8\"",
-            &["line 31", "mass of `fore`", "above zero"],
-        ),
-        (
-            "planar_2r.urdf",
-            "izz=\"0.001\"",
-            "izz=\"0.1\"",
-            &["line 31", "`fore`", "sum of the others"],
-        ),
-        (
-            "planar_2r.urdf",
-            "xyz=\"0 1 0\"",
-            "xyz=\"0 1\"",
-            &["line 9, column 16", "takes 3 numbers, found 2"],
-        ),
-        (
-            "planar_2r.urdf",
-            "damping=\"0.02\"",
-            "damping=\"-1\"",
-            &["line 25, column 24", "give zero or a positive number"],
-        ),
-        ("planar_2r.urdf", "</robot>", "", &["not valid XML"]),
-        (
-            "prr.xml",
-            "type=\"slide\"",
-            "type=\"ball\"",
-            &["prr.xml, line 7", "`ball`", "hinge and slide"],
-        ),
-        (
-            "prr.xml",
-            "<joint name=\"rail\"",
-            "<freejoint/><joint name=\"rail\"",
-            &["line 7", "remove it"],
-        ),
-        (
-            "prr.xml",
-            " armature=\"0.003\"/>\n          <inertial pos=\"0 0 -0.2\" mass=\"0.3\" diaginertia=\"0.006 0.006 0.0004\" xyaxes=\"1 0.1 0 0 1 0.3\"/>",
-            "/>",
-            &[
-                "line 13",
-                "`end` moves nothing that has inertia",
-                "<inertial>",
-            ],
-        ),
-        (
-            "prr.xml",
-            "stiffness=\"1.5\"",
-            "stiffness=\"1 2\"",
-            &["line 10", "polynomial"],
-        ),
-        (
-            "prr.xml",
-            "<actuator>",
-            "<equality><joint joint1=\"end\"/></equality><actuator>",
-            &["line 19", "closes a loop", "remove"],
-        ),
-        (
-            "geoms.xml",
-            "type=\"ellipsoid\"",
-            "type=\"mesh\"",
-            &["line 29", "mesh", "<inertial> in body `hand`"],
-        ),
-        (
-            "geoms.xml",
-            "class=\"main\"",
-            "class=\"mein\"",
-            &["line 22", "no default class `mein`"],
-        ),
-        (
-            "geoms.xml",
-            "autolimits=\"true\"",
-            "boundmass=\"1\"",
-            &["line 3", "`boundmass", "give the masses"],
-        ),
-        (
-            "geoms.xml",
-            "<option",
-            "<option><flag damper=\"disable\"/></option><option",
-            &["line 4", "`damper` is switched off"],
-        ),
-        (
-            "geoms.xml",
-            "zaxis=\"0.1 0.2 1\"",
-            "zaxis=\"0.1 0.2 1\" euler=\"0 0 1\"",
-            &["line 21", "second orientation"],
-        ),
-    ];
-    for (name, from, to, parts) in cases {
-        let message = message(name, from, to);
-        for part in *parts {
-            assert!(message.contains(part), "{part:?} is missing in:\n{message}");
-        }
+    for [name, from, to, words] in rows(REFUSED) {
+        let scratch = Scratch::new();
+        let contents = fs::read_to_string(fixture(&name)).unwrap();
+        scratch.file(&name, replaced(&contents, &from, &to));
+        let format = format_of(&fixture(&name)).name;
+        let line = format!("new --from-{format} {name} --out model.toml");
+        says_words(&scratch.refuses(&line), &words);
+        assert!(!scratch.has("model.toml"), "a file was left behind");
     }
 }
 
+/// Commands, and words of their messages.
+const COMMANDS: &str = "
+new --from-urdf $REPO/tests/fixtures/mechanisms/rp.xml | this is MJCF, read it as mjcf
+new --from-urdf nowhere.urdf                           | nowhere.urdf: cannot be read
+new                                                    | --from-urdf ... --from-mjcf
+";
+
 #[test]
 fn a_file_of_the_other_format_is_recognised() {
-    let file = fixture("rp.xml");
-    let said = refuses(&["new", "--from-urdf", text(&file)]);
-    assert!(said.contains("this is MJCF, read it as mjcf"), "{said}");
-    let said = refuses(&["new", "--from-urdf", "nowhere.urdf"]);
-    assert!(said.contains("nowhere.urdf: cannot be read"), "{said}");
-    let said = refuses(&["new"]);
-    assert!(
-        said.contains("--from-urdf") && said.contains("--from-mjcf"),
-        "{said}"
-    );
+    for [line, words] in rows(COMMANDS) {
+        says_words(&Scratch::new().refuses(&line), &words);
+    }
 }
 
 #[test]
@@ -377,13 +224,11 @@ fn angles_that_were_rounded_are_taken_as_written_and_noted() {
     let notes = chain("rounded_2r.urdf").notes;
     let note = "line 23: `rpy`: 1.5708 is taken as written; if 1.5707963267948966 is meant, writing it so makes shorter equations";
     assert!(notes.contains(&note.to_owned()), "{notes:?}");
+    let scratch = Scratch::new();
     let contents = fs::read_to_string(fixture("rounded_2r.urdf")).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("exact.urdf");
-    fs::write(&file, contents.replacen("1.5708", "1.5707963268", 1)).unwrap();
-    let text = model_text(&read(&file));
-    let short = "M11 = \"zz_1 + zz_2 + 1.2*mx_2*sin(q2)\"";
-    assert!(text.contains(short), "{text}");
+    scratch.file("exact.urdf", contents.replacen("1.5708", "1.5707963268", 1));
+    let text = model_text(&read(&scratch.path("exact.urdf")));
+    says(&text, &["M11 = \"zz_1 + zz_2 + 1.2*mx_2*sin(q2)\""]);
 }
 
 mod slow {
@@ -391,7 +236,7 @@ mod slow {
 
     #[test]
     fn mujoco_finds_the_same_torques() {
-        for name in FILES {
+        for name in independent() {
             mujoco_agrees(&fixture(name), &comparable(&system(&chain(name))));
         }
     }

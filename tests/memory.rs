@@ -7,22 +7,21 @@ use residyn_core::data::{Log, Quantity};
 use residyn_core::expr::SignForm;
 use residyn_core::identify::{Shooting, cut, fit, uncertainty};
 use residyn_core::lanes::Row;
-use residyn_core::model::{Dynamics, FittedEffect, Library};
+use residyn_core::model::{Dynamics, FittedEffect};
 use residyn_core::sim::{Commands, Hold, Sensors, StepTorque, with_own_angles};
-
-use serde_json::Value;
 
 use rand::RngExt;
 
-use crate::support::catalogue::{assert_near, dynamics, fitted, rng, system};
+use crate::support::catalogue::{self, assert_all_near, assert_near, dynamics, rng, system};
 use crate::support::logs::{add_noise, simulate};
-use crate::support::{evaluated, refuses, succeeds, text};
+use crate::support::reports::{error, estimate, names};
+use crate::support::{Scratch, says};
 
 const DELAY_S: f64 = 0.0073;
 const LAG_S: f64 = 0.015;
 
 fn effect(name: &str, value: f64) -> FittedEffect {
-    fitted(Library::built_in().effect(name).unwrap(), 0, &[value])
+    catalogue::effect(name, 0, &[value])
 }
 
 /// A mass of 1 with these filters: acceleration equals torque.
@@ -96,10 +95,9 @@ fn mean_torques_match_those_of_fine_steps() {
             (100.07, 100.09, 3),
         ] {
             let found = means(&model, from, to, parts).0;
-            for (found, wanted) in found.iter().zip(stepped(delay, lag, from, to, parts)) {
-                // Jumps of up to 4 N m fall within steps of 1 us, in parts of 2 ms and more.
-                assert_near(*found, wanted, 4e-3, &format!("{delay} {lag} {from}"));
-            }
+            let wanted = stepped(delay, lag, from, to, parts);
+            // Jumps of up to 4 N m fall within steps of 1 us, in parts of 2 ms and more.
+            assert_all_near(&found, &wanted, 4e-3, &format!("{delay} {lag} {from}"));
         }
     }
 }
@@ -194,48 +192,15 @@ fn fitted_delay_and_lag_lie_within_their_intervals() {
     }
 }
 
-/// A folder with three logs of 15 s of the pendulum with this effect, and a fourth for the test.
-fn recorded(effect: &str) -> (tempfile::TempDir, Vec<String>) {
-    let folder = tempfile::tempdir().unwrap();
-    let record = |seed: &str| {
-        let log = folder.path().join(format!("{seed}.csv"));
-        let all = [
-            "simulate",
-            "--plant",
-            "pendulum",
-            "--duration",
-            "15",
-            "--effect",
-            effect,
-        ];
-        succeeds(&[&all[..], &["--seed", seed, "--out", text(&log)]].concat());
-        text(&log).to_owned()
-    };
-    let logs = ["1", "2", "3", "91"].map(record).to_vec();
-    (folder, logs)
-}
-
 #[test]
 fn independent_transitions_are_refused_for_a_rig_with_delay() {
-    let recipe = include_str!("../configs/smoke/train-pendulum.toml");
-    assert!(recipe.contains("plant = "));
-    let folder = tempfile::tempdir().unwrap();
-    let plant = folder.path().join("late.toml");
-    let pendulum = include_str!("../models/pendulum.toml");
-    let late = "\n[[effect]]\nname = \"actuator_delay\"\njoint = 1\nd = 0.01\n";
-    std::fs::write(&plant, format!("{pendulum}{late}")).unwrap();
-    let line = recipe
-        .lines()
-        .find(|line| line.starts_with("plant = "))
-        .unwrap();
-    let config = folder.path().join("recipe.toml");
-    std::fs::write(&config, recipe.replace(line, "plant = \"late.toml\"")).unwrap();
-    let out = folder.path().join("out");
-    let message = refuses(&["train", "--config", text(&config), "--out", text(&out)]);
-    assert!(
-        message.contains("effect with memory") && message.contains("residyn simulate"),
-        "{message}"
-    );
+    let scratch = Scratch::new();
+    let late = "[[effect]]\nname = \"actuator_delay\"\njoint = 1\nd = 0.01\n\n[energy]";
+    scratch.model("late.toml", "[energy]", late);
+    let plant = ["plant = \"pendulum-real\"", "plant = \"late.toml\""];
+    scratch.changed("smoke/train-pendulum.toml", plant[0], plant[1]);
+    let message = scratch.refuses("train --config train-pendulum.toml --out out");
+    says(&message, &["effect with memory", "residyn simulate"]);
 }
 
 /// The error message for an effect file with this in place of the delay's line.
@@ -283,11 +248,7 @@ fn expressions_of_filters_state_what_they_do_to_the_command() {
 }
 
 fn backlash(delta: f64, driven: f64) -> FittedEffect {
-    fitted(
-        Library::built_in().effect("backlash").unwrap(),
-        0,
-        &[delta, driven],
-    )
+    catalogue::effect("backlash", 0, &[delta, driven])
 }
 
 #[test]
@@ -319,9 +280,8 @@ fn play_separates_the_measured_angle_from_the_links() {
 
 #[test]
 fn a_disc_off_its_axis_reads_ahead_and_behind() {
-    let library = Library::built_in();
-    let disc = library.effect("encoder_eccentricity").unwrap();
-    let model = pendulum(&[fitted(disc, 0, &[0.02, -0.01])]);
+    let disc = catalogue::effect("encoder_eccentricity", 0, &[0.02, -0.01]);
+    let model = pendulum(&[disc]);
     let mut sensors = Sensors::<1>::new(&model);
     for (angle, ahead) in [(0.0, -0.01), (FRAC_PI_2, 0.02), (PI, 0.01)] {
         let state = [Row([angle]), Row([0.0])];
@@ -381,43 +341,30 @@ mod slow {
 
     #[test]
     fn closing_the_loop_names_the_effect_with_memory_or_of_the_sensor() {
-        for (setting, name, truth) in [
-            ("actuator_delay=0.01", "actuator_delay", 0.01),
-            ("actuator_lag=0.02", "actuator_lag", 0.02),
-            ("backlash=0.01", "backlash", 0.01),
-            ("encoder_eccentricity=0.01", "encoder_eccentricity", 0.01),
+        for (name, truth) in [
+            ("actuator_delay", 0.01),
+            ("actuator_lag", 0.02),
+            ("backlash", 0.01),
+            ("encoder_eccentricity", 0.01),
         ] {
-            let (folder, logs) = recorded(setting);
-            let [a, b, c, test] = [0, 1, 2, 3].map(|k| logs[k].as_str());
-            let out = folder.path().join("report");
-            let given = ["--model", "pendulum", "--train", a, b, c, "--test", test];
-            let json =
-                succeeds(&[&["closeloop", "--json", "--out", text(&out)], &given[..]].concat());
-            let report: Value = serde_json::from_str(&json).unwrap();
+            let scratch = Scratch::new();
+            let plant = format!("pendulum --duration 15 --effect {name}={truth}");
+            scratch.simulates(&plant, &[1, 2, 3, 91]);
+            let logs = "--train run1.csv run2.csv run3.csv --test run91.csv";
+            let line = format!("closeloop --model pendulum {logs} --out report");
+            let report = scratch.json(&line);
             assert_eq!(report["verdict"], "explained", "{name}");
-            let effects = report["effects"].as_array().unwrap();
-            assert_eq!(effects.len(), 1, "{effects:?}");
-            assert_eq!(effects[0]["name"], name);
-            let parameter = &effects[0]["parameters"][0];
-            let end = |k: usize| parameter["ci95"][k].as_f64().unwrap();
-            assert!(end(0) < truth && truth < end(1), "{parameter}");
+            assert_eq!(names(&report), [name]);
+            let parameter = &report["effects"][0]["parameters"][0];
+            let [_, low, high] = estimate(parameter).unwrap();
+            assert!(low < truth && truth < high, "{parameter}");
 
             // The written model predicts the same when it is read again.
-            let error = |model: &[&str]| evaluated(model, test);
-            let message = |which: &str| {
-                report["error"][which]["position_rmse"][1][0]
-                    .as_f64()
-                    .unwrap()
-            };
-            let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
-            assert_near(
-                error(&["--model", text(&model)]) / message("after"),
-                1.0,
-                1e-9,
-                name,
-            );
-            let read = error(&["--checkpoint", text(&checkpoint)]);
-            assert_near(read / message("hybrid"), 1.0, 1e-4, name);
+            let read = |model: &str| scratch.evaluated(&format!("{model} --test run91.csv"));
+            let fitted = read("--model report/model.toml") / error(&report, "after");
+            assert_near(fitted, 1.0, 1e-9, name);
+            let hybrid = read("--checkpoint report/checkpoint") / error(&report, "hybrid");
+            assert_near(hybrid, 1.0, 1e-4, name);
         }
     }
 }

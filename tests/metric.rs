@@ -5,10 +5,10 @@ use rand::RngExt;
 use residyn_core::data::{Interval, Log};
 use residyn_core::expr::SignForm;
 use residyn_core::identify::calibrate;
-use residyn_core::model::{Dynamics, Library};
+use residyn_core::model::Dynamics;
 use residyn_core::sim::metric::{Assessment, Summary, assess, summarise};
 
-use crate::support::catalogue::{dynamics, fitted, rng, system};
+use crate::support::catalogue::{dynamics, effect, rng, system};
 use crate::support::logs::{empty_log, simulate};
 use crate::support::oracles::{ORACLES, Oracle};
 
@@ -293,9 +293,8 @@ fn a_window_that_touches_what_is_left_out_is_dropped() {
 
 #[test]
 fn a_window_that_diverges_counts() {
-    let library = Library::built_in();
     // Friction that drives: the speed grows by e^60 in a second.
-    let drive = fitted(library.effect("viscous_friction").unwrap(), 0, &[-20.0]);
+    let drive = effect("viscous_friction", 0, &[-20.0]);
     let model = dynamics(&system("pendulum"), &[drive], SignForm::Exact);
     let tame = dynamics(&system("pendulum"), &[], SignForm::Exact);
     let logs = [simulate(&tame, &[1.0, 0.0], 1.0, 500, 1)];

@@ -5,10 +5,10 @@ use std::path::Path;
 use residyn::read_model;
 use residyn_core::expr::SignForm;
 use residyn_core::model::{Library, Model};
-use serde_json::Value;
 
+use crate::support::Scratch;
 use crate::support::catalogue::{assert_near, dynamics, points};
-use crate::support::{succeeds, text};
+use crate::support::reports::{error, estimate, names};
 
 /// An arm in masses. The motor's inertia is known, so that a heavier arm is not a weaker motor.
 const ARM: &str = r#"
@@ -95,65 +95,34 @@ mod slow {
 
     #[test]
     fn a_wrong_mass_is_named_with_its_right_value() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        std::fs::write(at("arm.toml"), ARM).unwrap();
-        std::fs::write(at("rig.toml"), RIG).unwrap();
-        let logs: Vec<_> = (1..5).map(|k| at(&format!("run{k}.csv"))).collect();
-        let logs: Vec<&str> = logs.iter().map(|log| text(log)).collect();
-        for (log, seed) in logs.iter().zip(["1", "2", "3", "4"]) {
-            let rig = at("rig.toml");
-            succeeds(&[
-                "simulate",
-                "--plant",
-                text(&rig),
-                "--seed",
-                seed,
-                "--out",
-                log,
-            ]);
-        }
-        let (arm, out) = (at("arm.toml"), at("report"));
-        let all = [
-            &["closeloop", "--json", "--model", text(&arm), "--train"],
-            &logs[..3],
-            &["--test", logs[3], "--out", text(&out)],
-        ];
-        let report: Value = serde_json::from_str(&succeeds(&all.concat())).unwrap();
+        let scratch = Scratch::new();
+        scratch.file("arm.toml", ARM);
+        scratch.file("rig.toml", RIG);
+        scratch.simulates("rig.toml", &[1, 2, 3, 4]);
+        let logs = "--train run1.csv run2.csv run3.csv --test run4.csv";
+        let report = scratch.json(&format!("closeloop --model arm.toml {logs} --out report"));
         assert_eq!(report["verdict"], "explained");
-        let effects = report["effects"].as_array().unwrap();
-        assert_eq!(effects.len(), 1, "{effects:?}");
-        assert_eq!(effects[0]["name"], "parameter_shift");
-        assert_eq!(effects[0]["expression"], "m = 1.2 (declared 1)");
-        let parameter = &effects[0]["parameters"][0];
+        assert_eq!(names(&report), ["parameter_shift"]);
+        let effect = &report["effects"][0];
+        assert_eq!(effect["expression"], "m = 1.2 (declared 1)");
+        let parameter = &effect["parameters"][0];
         assert_eq!(parameter["name"], "m");
         assert_eq!(parameter["unit"], "kg");
-        let number = |value: &Value| value.as_f64().unwrap();
-        let [low, high] = [0, 1].map(|end| number(&parameter["ci95"][end]));
-        assert!(
-            (number(&parameter["value"]) - TRUE_M).abs() < high - low,
-            "{parameter}"
-        );
+        let [value, low, high] = estimate(parameter).unwrap();
+        assert!((value - TRUE_M).abs() < high - low, "{parameter}");
         assert!(high - low < 0.01, "{parameter}");
         // The written model holds the shifted value in the parameter's place, and predicts the same, as does the
         // checkpoint's.
-        let written = read_model(out.join("model.toml"), &Library::built_in()).unwrap();
+        let library = Library::built_in();
+        let written = read_model(scratch.path("report/model.toml"), &library).unwrap();
         assert!(written.effects.is_empty());
-        assert_eq!(written.parameters[0].value, number(&parameter["value"]));
-        let error = |model: &[&str]| {
-            let all = [&["evaluate", "--json", "--test", logs[3]], model].concat();
-            let value: Value = serde_json::from_str(&succeeds(&all)).unwrap();
-            number(&value["position_rmse"][1][0])
-        };
-        let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
-        let after = number(&report["error"]["after"]["position_rmse"][1][0]);
-        assert_near(error(&["--model", text(&model)]), after, 1e-9, "model.toml");
-        let hybrid = number(&report["error"]["hybrid"]["position_rmse"][1][0]);
-        assert_near(
-            error(&["--checkpoint", text(&checkpoint)]),
-            hybrid,
-            1e-6,
-            "checkpoint",
-        );
+        assert_eq!(written.parameters[0].value, value);
+        for (model, of, share) in [
+            ("--model report/model.toml", "after", 1e-9),
+            ("--checkpoint report/checkpoint", "hybrid", 1e-6),
+        ] {
+            let read = scratch.evaluated(&format!("{model} --test run4.csv"));
+            assert_near(read, error(&report, of), share, model);
+        }
     }
 }

@@ -4,7 +4,7 @@ use burn::tensor::{Device, Tensor};
 use residyn_core::expr::{Program, SignForm};
 use residyn_core::lanes::Row;
 
-use crate::support::catalogue::{assert_near, catalog, column, in_f32, points};
+use crate::support::catalogue::{assert_all_near, assert_near, catalog, column, in_f32, points};
 use crate::support::tensors::{devices, numbers, tensor};
 
 /// f32 keeps 24 bits, 6e-8 of a value. The accelerations here are sums of terms up to some tens whose
@@ -122,9 +122,7 @@ fn replay(program: &Program, inputs: &[Tensor<1>]) -> Vec<Vec<f64>> {
 fn compare(name: &str, program: &Program, points: &[Vec<f64>], found: &[Vec<f64>]) {
     assert_eq!(points.len(), found.len());
     for (point, found) in points.iter().zip(found) {
-        for (found, wanted) in found.iter().zip(program.eval(point)) {
-            assert_near(*found, wanted, F32, name);
-        }
+        assert_all_near(found, &program.eval(point), F32, name);
     }
 }
 

@@ -7,7 +7,7 @@ use residyn_core::lanes::Row;
 use residyn_core::model::{Dynamics, Model};
 use residyn_core::sim::{RK4, SCHEMES, Scheme, Stepper};
 
-use crate::support::catalogue::{all_systems, dynamics, points, system};
+use crate::support::catalogue::{all_systems, assert_energy_balanced, dynamics, points, system};
 
 /// A system that states its energy, ready to run.
 struct Balanced {
@@ -33,30 +33,12 @@ impl Balanced {
 }
 
 #[test]
-fn every_system_states_its_energy() {
-    for system in all_systems() {
-        assert!(system.energy_program().is_some(), "{}", system.name);
-    }
-}
-
-#[test]
 fn energy_changes_by_the_power_at_every_point() {
     for system in all_systems() {
-        let balanced = Balanced::new(&system);
-        for point in points(&balanced.model, 500, 2) {
-            let rates = balanced.model.program.eval(&point);
-            let energy = balanced.energy.eval(&point);
-            let (power, slopes) = (energy[1], &energy[2..]);
-            let parts: Vec<f64> = slopes.iter().zip(&rates).map(|(s, r)| s * r).collect();
-            let change: f64 = parts.iter().sum();
-            // Rounding of the terms that cancel.
-            let size: f64 = parts.iter().map(|part| part.abs()).sum();
-            assert!(
-                (change - power).abs() <= 1e-13 * size,
-                "{}: {change} or {power} of {size}",
-                system.name
-            );
-        }
+        let Balanced { model, energy } = Balanced::new(&system);
+        let points = points(&model, 500, 2);
+        // Rounding of the terms that cancel.
+        assert_energy_balanced(&model, &energy, &points, 1e-13);
     }
 }
 

@@ -7,7 +7,7 @@ use residyn_core::expr::{Graph, Node, Program, Scope, SignForm, parse};
 use residyn_core::model::{Dynamics, Library};
 
 use crate::support::catalogue::{
-    all_systems, assert_near, can_act, catalog, fitted, jacobian, points,
+    all_systems, assert_all_near, can_act, catalog, fitted, jacobian, points,
 };
 
 const SIGNS: [SignForm; 2] = [SignForm::Exact, SignForm::Smooth { width: 0.05 }];
@@ -40,10 +40,8 @@ fn check_text(name: &str, program: &Program, points: &[Vec<f64>]) {
     let borrowed: Vec<&str> = outputs.iter().map(String::as_str).collect();
     let again = read_back(&program.text(&borrowed), program.inputs(), &outputs);
     for point in points {
-        for (found, wanted) in again.eval(point).iter().zip(program.eval(point)) {
-            // The same operations in the same order: no rounding except that of folded constants.
-            assert_near(*found, wanted, 1e-14, name);
-        }
+        // The same operations in the same order: no rounding except that of folded constants.
+        assert_all_near(&again.eval(point), &program.eval(point), 1e-14, name);
     }
 }
 
@@ -81,9 +79,8 @@ fn formulas_with_every_intermediate_written_out_read_back() {
             .collect();
         let again = read_back(&lines.join("\n"), program.inputs(), &outputs);
         for point in points(&case.dynamics, 5, 4) {
-            for (found, wanted) in again.eval(&point).iter().zip(program.eval(&point)) {
-                assert_near(*found, wanted, 1e-14, &case.name);
-            }
+            let wanted = program.eval(&point);
+            assert_all_near(&again.eval(&point), &wanted, 1e-14, &case.name);
         }
     }
 }

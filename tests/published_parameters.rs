@@ -1,12 +1,11 @@
 //! Model files of published parameter sets against accelerations worked out by hand from the published equations.
 
-use std::path::Path;
-
 use residyn::read_model;
 use residyn_core::expr::SignForm;
 use residyn_core::model::Library;
 
-use crate::support::catalogue::{assert_near, dynamics};
+use crate::support::catalogue::{assert_all_near, dynamics};
+use crate::support::paths::ours;
 
 /// The file, then points: states and torques, and the accelerations at each.
 type Case = (&'static str, &'static [(&'static [f64], &'static [f64])]);
@@ -61,18 +60,15 @@ const ROUNDING: f64 = 1e-10;
 
 #[test]
 fn published_parameter_sets_have_the_published_accelerations() {
-    let rigs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/rigs");
     for (name, points) in CASES {
-        let file = rigs.join(name).with_extension("toml");
+        let file = ours("docs/rigs").join(name).with_extension("toml");
         let system = read_model(&file, &Library::built_in()).unwrap();
         assert_eq!(system.name, name);
         let model = dynamics(&system, &[], SignForm::Exact);
         for (state, wanted) in points {
             let inputs = [state, [0.0].as_slice(), &model.values()].concat();
             let found = model.program.eval(&inputs);
-            for (joint, wanted) in wanted.iter().enumerate() {
-                assert_near(found[model.joints + joint], *wanted, ROUNDING, name);
-            }
+            assert_all_near(&found[model.joints..], wanted, ROUNDING, name);
         }
     }
 }

@@ -1,45 +1,33 @@
 //! Shell completions and manual pages from the definitions of the commands.
 
-use std::fs;
 use std::process::Command;
 
-use crate::support::{refuses, succeeds, text};
+use crate::support::{Scratch, says};
 
 #[test]
 fn a_shell_reads_the_completions() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("residyn.bash");
-    fs::write(&file, succeeds(&["completions", "bash"])).unwrap();
+    let scratch = Scratch::new();
+    scratch.file("residyn.bash", scratch.succeeds("completions bash"));
     // Complete the third word of `residyn closeloop --tr`.
-    let ask = format!(
-        "source {}; COMP_WORDS=(residyn closeloop --tr); COMP_CWORD=2; _residyn residyn --tr closeloop; echo \"${{COMPREPLY[@]}}\"",
-        text(&file)
-    );
-    let shell = Command::new("bash").args(["-c", &ask]).output().unwrap();
-    assert_eq!(String::from_utf8_lossy(&shell.stdout).trim(), "--train");
+    let ask = "source ./residyn.bash; COMP_WORDS=(residyn closeloop --tr); COMP_CWORD=2; \
+               _residyn residyn --tr closeloop; echo \"${COMPREPLY[@]}\"";
+    let mut shell = Command::new("bash");
+    let shell = shell.args(["-c", ask]).current_dir(scratch.folder());
+    let completed = shell.output().unwrap().stdout;
+    assert_eq!(String::from_utf8_lossy(&completed).trim(), "--train");
 }
 
 #[test]
 fn every_command_has_a_manual_page() {
-    let folder = tempfile::tempdir().unwrap();
-    let manual = folder.path().join("share/man1");
-    succeeds(&["man", text(&manual)]);
+    let scratch = Scratch::new();
+    scratch.succeeds("man share/man1");
     for command in [
         "residyn",
         "residyn-closeloop",
         "residyn-report",
         "residyn-bench-effects",
     ] {
-        let page = fs::read_to_string(manual.join(format!("{command}.1"))).unwrap();
-        assert!(page.contains(".SH SYNOPSIS"), "{command}");
+        let page = scratch.read(&format!("share/man1/{command}.1"));
+        says(&page, &[".SH SYNOPSIS"]);
     }
-}
-
-#[test]
-fn an_unknown_plant_lists_the_plants() {
-    let said = refuses(&["control", "--model", "pendulum", "--plant", "nope"]);
-    assert!(
-        said.contains("one of the plants") && said.contains("pendulum-real"),
-        "{said}"
-    );
 }

@@ -1,14 +1,12 @@
 //! What closing the loop prints in a terminal: the full answer in lines of eighty characters, thirty of them if there
 //! is not very much to say.
 
-use std::fs;
 use std::path::Path;
 
 use residyn_report::{Report, Words, summary};
 use serde_json::{Value, json};
 
-use crate::support::paths::ours;
-use crate::support::{succeeds, text};
+use crate::support::{Scratch, says};
 
 const BLOCKS: [char; 2] = ['█', '▁'];
 
@@ -24,27 +22,24 @@ fn is_narrow(said: &str) {
 
 #[test]
 fn the_answer_fits_a_terminal_for_a_pendulum_and_for_an_arm() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("r");
-    let log = ours("tests/fixtures/logs/pendulum.csv");
-    let rig = ["--model", "pendulum", "--train", text(&log)];
-    let closed = ["closeloop", "--curves", "--out", text(&out)];
-    let said = succeeds(&[&closed[..], &rig].concat());
+    let scratch = Scratch::new();
+    let rig = "--model pendulum --train $REPO/tests/fixtures/logs/pendulum.csv";
+    let said = scratch.succeeds(&format!("closeloop --curves --out r {rig}"));
     fits(said.rsplit_once("\nTook ").unwrap().0);
-    for words in [
-        "The model lacks coulomb_friction on joint 1",
-        "What is missing?\n  coulomb_friction on joint 1: -F_c1 * sign(qd1)\n    F_c1 = 0.1",
-        "How much better is it? Open-loop errors on the test logs, rad\n",
-        "as written     fitted  with effects\n  joint 1, 0.1 s ahead",
-        "Can I trust it?\n",
-        "What next? ",
-        "report.html; model and plots are next to it\n",
-    ] {
-        assert!(said.contains(words), "{words} is missing in\n{said}");
-    }
+    says(
+        &said,
+        &[
+            "The model lacks coulomb_friction on joint 1",
+            "What is missing?\n  coulomb_friction on joint 1: -F_c1 * sign(qd1)\n    F_c1 = 0.1",
+            "How much better is it? Open-loop errors on the test logs, rad\n",
+            "as written     fitted  with effects\n  joint 1, 0.1 s ahead",
+            "Can I trust it?\n",
+            "What next? ",
+            "report.html; model and plots are next to it\n",
+        ],
+    );
     assert!(BLOCKS.iter().all(|block| said.contains(*block)), "{said}");
-    let report: Value =
-        serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+    let report = scratch.read_json("r/report.json");
     for compared in ["output_error", "inverse_dynamics"] {
         let value = arm(report.clone(), compared);
         let drawn = vec![String::from("  a curve"); 3];
@@ -77,18 +72,21 @@ fn the_answer_fits_a_terminal_for_a_pendulum_and_for_an_arm() {
             &said,
             format!("held, since the logs do not determine them: {held}"),
         );
-        assert!(
-            said.starts_with("Serious, to be fixed first (and 1 more"),
-            "{said}"
-        );
-        assert!(said.contains("and 5 more effects in report.md"), "{said}");
+        let begins = "Serious, to be fixed first (and 1 more";
+        assert!(said.starts_with(begins), "{said}");
         let last = match compared {
             "output_error" => "and 3 more joints in report.md",
             _ => "joint 7 (wrist_flange_joint)",
         };
-        assert!(said.contains(last), "{said}");
-        assert!(said.contains("not ruled out: "), "{said}");
-        assert!(said.contains("What next? "), "{said}");
+        says(
+            &said,
+            &[
+                "and 5 more effects in report.md",
+                last,
+                "not ruled out: ",
+                "What next? ",
+            ],
+        );
     }
 }
 

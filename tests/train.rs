@@ -1,7 +1,6 @@
 //! `residyn train` and `residyn tune`, through the binary if the command line matters.
 
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::time::Duration;
 
 use residyn_core::model::Library;
@@ -10,8 +9,9 @@ use residyn_train::recipe::{Job, Recipe, TrainingResults};
 use residyn_train::{Backend, Penalty};
 use serde_json::Value;
 
-use crate::support::in_folder::{json, kill_after, refused, residyn, run};
-use crate::support::paths::{config, configs};
+use crate::support::in_folder::kill_after;
+use crate::support::paths::configs;
+use crate::support::{Scratch, says};
 
 /// A recipe run in this process.
 fn train(recipe: Recipe, backend: Backend) -> TrainingResults {
@@ -39,140 +39,87 @@ fn worst(outcome: &TrainingResults) -> f64 {
     outcome.parameters.iter().map(off).fold(0.0, f64::max)
 }
 
+/// Short recipes for training and for tuning.
+const SHORT: &str = "--config $REPO/configs/smoke/train-pendulum.toml";
+const TUNING: &str = "--config $REPO/configs/smoke/tune-pendulum.toml";
+
 #[test]
 fn a_checkpoint_of_another_run_is_not_overwritten() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let config = config("smoke/train-pendulum.toml");
-    let command = ["train", "--config", &config, "--out", "pendulum"];
-    let first = json(dir, &command);
+    let scratch = Scratch::new();
+    let train = format!("train {SHORT} --out pendulum");
+    let first = scratch.json(&train);
     // The same command again returns at once, although the folder now has the name of a built-in system.
-    assert_eq!(json(dir, &command), first);
-    let before = std::fs::read(dir.join("pendulum/weights.safetensors")).unwrap();
-    let message = refused(dir, &[command.as_slice(), &["--seed", "7"]].concat());
+    assert_eq!(scratch.json(&train), first);
+    let weights = || std::fs::read(scratch.path("pendulum/weights.safetensors")).unwrap();
+    let before = weights();
     assert_eq!(
-        message,
+        scratch.refuses(&format!("{train} --seed 7")),
         "error: pendulum holds another run: its `seed` is 0, here it is 7; give another \
          folder with --out, or remove this one to start over\n"
     );
-    let text = std::fs::read_to_string(&config).unwrap();
-    let longer = text.replace("epochs = 200", "epochs = 300");
-    let longer = longer.replace(
-        "../plants/",
-        &format!("{}/", configs().join("plants").display()),
-    );
-    std::fs::write(dir.join("longer.toml"), longer).unwrap();
-    let message = refused(
-        dir,
-        &["train", "--config", "longer.toml", "--out", "pendulum"],
-    );
-    assert!(message.contains("its `recipe."), "{message}");
-    let after = std::fs::read(dir.join("pendulum/weights.safetensors")).unwrap();
-    assert!(before == after);
+    scratch.changed("smoke/train-pendulum.toml", "epochs = 200", "epochs = 300");
+    let longer = scratch.refuses("train --config train-pendulum.toml --out pendulum");
+    says(&longer, &["its `recipe."]);
+    assert!(before == weights());
 
-    std::fs::create_dir(dir.join("full")).unwrap();
-    std::fs::write(dir.join("full/thesis.txt"), "").unwrap();
-    let message = refused(dir, &["train", "--config", &config, "--out", "full"]);
-    assert!(message.contains("it holds other files"), "{message}");
+    std::fs::create_dir(scratch.path("full")).unwrap();
+    scratch.file("full/thesis.txt", "");
+    let full = scratch.refuses(&format!("train {SHORT} --out full"));
+    says(&full, &["it holds other files"]);
 }
 
 #[test]
 fn tuning_fits_a_simulated_prior_to_the_real_plant() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let offline = config("smoke/train-pendulum-offline.toml");
-    json(dir, &["train", "--config", &offline, "--out", "sim"]);
-    let config = config("smoke/tune-pendulum.toml");
-    let command = [
-        "tune",
-        "--checkpoint",
-        "sim",
-        "--config",
-        &config,
-        "--out",
-        "real",
-    ];
-    let outcome = json(dir, &command);
+    let scratch = Scratch::new();
+    scratch.succeeds("train --config $REPO/configs/smoke/train-pendulum-offline.toml --out sim");
+    let tune = format!("tune --checkpoint sim {TUNING} --out");
+    let outcome = scratch.json(&format!("{tune} real"));
     let error = |when: &str| outcome["test_error"][when].as_f64().unwrap();
     assert!(error("after") < 0.5 * error("before"), "{outcome}");
-    assert_eq!(json(dir, &command), outcome);
+    assert_eq!(scratch.json(&format!("{tune} real")), outcome);
     // The prior is left as it is, and the result cannot overwrite it.
-    let own = [
-        "tune",
-        "--checkpoint",
-        "sim",
-        "--config",
-        &config,
-        "--out",
-        "sim",
-    ];
-    assert!(refused(dir, &own).contains("sim holds another run"));
+    let own = scratch.refuses(&format!("{tune} sim"));
+    says(&own, &["sim holds another run"]);
 }
 
 #[test]
 fn tuning_on_logs_needs_no_recipe() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let plant = config("plants/pendulum-real.toml");
-    for (log, seed) in [("run1.csv", "1"), ("run2.csv", "2")] {
-        json(
-            dir,
-            &["simulate", "--plant", &plant, "--out", log, "--seed", seed],
-        );
-    }
-    let recipe = config("smoke/train-pendulum.toml");
-    json(dir, &["train", "--config", &recipe, "--out", "prior"]);
-    json(
-        dir,
-        &[
-            "tune",
-            "--checkpoint",
-            "prior",
-            "--train",
-            "run1.csv",
-            "--out",
-            "tuned",
-        ],
-    );
-    let error = |checkpoint: &str| {
-        let evaluate = ["evaluate", "--checkpoint", checkpoint, "--test", "run2.csv"];
-        json(dir, &[&evaluate[..], &["--horizon", "0.5"]].concat())["position_rmse"][0][0]
-            .as_f64()
-            .unwrap()
-    };
+    let scratch = Scratch::new();
+    scratch.simulates("pendulum-real", &[1, 2]);
+    scratch.succeeds(&format!("train {SHORT} --out prior"));
+    scratch.succeeds("tune --checkpoint prior --train run1.csv --out tuned");
+    let error =
+        |checkpoint: &str| scratch.evaluated(&format!("--checkpoint {checkpoint} --test run2.csv"));
     assert!(error("tuned") < error("prior"));
 
     let logs = "model = \"pendulum\"\nkind = \"hybrid\"\n[data]\nlogs = [\"run1.csv\"]\n\
                 [fit]\nepochs = 20\nintegrator = \"rk4\"\n";
-    std::fs::write(dir.join("logs.toml"), logs).unwrap();
-    let outcome = json(dir, &["train", "--config", "logs.toml"]);
+    scratch.file("logs.toml", logs);
+    let outcome = scratch.json("train --config logs.toml");
     assert_eq!(outcome["checkpoint"], "logs-checkpoint");
     assert!(outcome["error"]["after"].as_f64() < outcome["error"]["before"].as_f64());
 }
 
 #[test]
 fn tuning_refuses_other_systems_start_values_and_missing_checkpoints() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let acrobot = config("smoke/train-acrobot.toml");
-    json(dir, &["train", "--config", &acrobot, "--out", "acrobot"]);
-    let pendulum = config("smoke/tune-pendulum.toml");
+    let scratch = Scratch::new();
+    let acrobot = "--config $REPO/configs/smoke/train-acrobot.toml";
+    scratch.succeeds(&format!("train {acrobot} --out acrobot"));
     for (checkpoint, config, part) in [
         (
             "acrobot",
-            &pendulum,
+            TUNING,
             "its system is acrobot, the model's is pendulum",
         ),
         (
             "acrobot",
-            &acrobot,
+            acrobot,
             "[start] and `hold` are for training from scratch",
         ),
-        ("none", &pendulum, "not a checkpoint"),
+        ("none", TUNING, "not a checkpoint"),
     ] {
-        let tune = ["tune", "--checkpoint", checkpoint, "--config", config];
-        let message = refused(dir, &tune);
-        assert!(message.contains(part), "{message}");
+        let message = scratch.refuses(&format!("tune --checkpoint {checkpoint} {config}"));
+        says(&message, &[part]);
     }
 }
 
@@ -233,27 +180,20 @@ mod slow {
 
     #[test]
     fn a_killed_run_resumes_to_the_same_numbers() {
-        let config = config("train-pendulum.toml");
-        let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let command = [
-            "train",
-            "--config",
-            &config,
-            "--save-every",
-            "20",
-            "--out",
-            "c",
-        ];
-        let expected = json(whole.path(), &command);
-
-        let manifest = killed.path().join("c/checkpoint.json");
+        let [whole, killed] = [(); 2].map(|()| Scratch::new());
+        let line = "train --config $REPO/configs/train-pendulum.toml --save-every 20 --out c";
+        let expected = whole.json(line);
         for _ in 0..2 {
-            let mut command = residyn(killed.path(), &command);
-            kill_after(&mut command, &manifest, Duration::from_millis(120));
+            let manifest = killed.path("c/checkpoint.json");
+            kill_after(
+                &mut killed.command(line),
+                &manifest,
+                Duration::from_millis(120),
+            );
         }
-        let output = run(killed.path(), &[command.as_slice(), &["--json"]].concat());
+        let output = killed.run(&format!("{line} --json"));
         let notes = String::from_utf8(output.stderr).unwrap();
-        assert!(notes.contains("note: c resumes from epoch"), "{notes}");
+        says(&notes, &["note: c resumes from epoch"]);
         let found: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(found, expected);
         for file in [
@@ -262,10 +202,9 @@ mod slow {
             "checkpoint.json",
             "model.toml",
         ] {
-            let read = |dir: &Path| std::fs::read(dir.join("c").join(file)).unwrap();
-            assert!(read(whole.path()) == read(killed.path()), "{file}");
+            let read = |scratch: &Scratch| std::fs::read(scratch.path("c").join(file)).unwrap();
+            assert!(read(&whole) == read(&killed), "{file}");
         }
-        let left = std::fs::read_dir(killed.path()).unwrap().count();
-        assert_eq!(left, 1, "only the checkpoint is left");
+        assert_eq!(killed.count(), 1, "only the checkpoint is left");
     }
 }

@@ -8,7 +8,9 @@ use residyn_experiments::experiment::undeclared_effect::{Experiment, PlanningMod
 use residyn_io::runs::RunFolder;
 use residyn_train::Backend;
 
+use crate::support::Scratch;
 use crate::support::paths::configs;
+use crate::support::tables::rows;
 
 fn session(path: &Path) -> Session {
     let experiment = Experiment::read(path).unwrap();
@@ -66,45 +68,25 @@ fn friction_is_named_after_an_episode_and_the_return_recovered() {
     assert!(refused.contains("holds another run: its `fit.epochs` is 20, here it is 21"));
 }
 
+/// A text of the experiment's file, what stands there instead, and words of the message.
+const BAD: &str = r#"
+episodes = [1]               | episodes = [3, 1]     | increasing numbers above zero
+seeds = 1                    | seeds = 0             | at least one each
+name = "coulomb_friction"\n  | name = "a/b"\n        | use letters
+F_c = 0.7                    | F_d = 0.7             | has no parameter `F_d`; did you mean `F_c`
+"pendulum-rig"               | "acrobot-rig"         | the task is for acrobot
+seeds = 1                    | seed = 1              | unknown field `seed`
+"#;
+
 #[test]
 fn bad_experiments_are_refused_with_their_remedy() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("e.toml");
-    let text = std::fs::read_to_string(smoke()).unwrap();
-    let message = |from: &str, to: &str| {
-        assert!(text.contains(from), "{from}");
-        std::fs::write(&path, text.replace(from, to)).unwrap();
-        let read = Experiment::read(&path);
+    let scratch = Scratch::new();
+    for [from, to, words] in rows(BAD) {
+        let path = scratch.changed("smoke/undeclared-effect.toml", &from, &to);
+        let read = Experiment::read(path.as_ref());
         let session = read.and_then(|e| Session::new(e, Library::built_in(), Backend::NdArray, 0));
-        session.err().unwrap().to_string()
-    };
-    let cases = [
-        (
-            "episodes = [1]",
-            "episodes = [3, 1]",
-            "increasing numbers above zero",
-        ),
-        ("seeds = 1", "seeds = 0", "at least one each"),
-        (
-            "name = \"coulomb_friction\"\n",
-            "name = \"a/b\"\n",
-            "use letters",
-        ),
-        (
-            "F_c = 0.7",
-            "F_d = 0.7",
-            "has no parameter `F_d`; did you mean `F_c`",
-        ),
-        (
-            "\"pendulum-rig\"",
-            "\"acrobot-rig\"",
-            "the task is for acrobot",
-        ),
-        ("seeds = 1", "seed = 1", "unknown field `seed`"),
-    ];
-    for (from, to, expected) in cases {
-        let found = message(from, to);
-        assert!(found.contains(expected), "{found}");
-        assert!(found.starts_with(path.to_str().unwrap()), "{found}");
+        let found = session.err().unwrap().to_string();
+        assert!(found.contains(&words), "{found}");
+        assert!(found.starts_with(&path), "{found}");
     }
 }

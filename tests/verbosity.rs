@@ -1,16 +1,16 @@
 //! How much the program says, and where: `--quiet`, `--verbose`, colours, pipes that close.
 
-use std::process::{Command, Output, Stdio};
+use std::process::{Output, Stdio};
 
-use crate::support::{residyn, succeeds, text};
+use crate::support::Scratch;
 
-/// A log with a joint at rest, which is a serious finding.
-fn still() -> tempfile::NamedTempFile {
-    let log = tempfile::Builder::new().suffix(".csv").tempfile().unwrap();
-    let rows = (0..300).map(|row| format!("{},0.5,0,{}\n", f64::from(row) * 0.01, row % 7));
-    let rows: String = rows.collect();
-    std::fs::write(log.path(), format!("time,q1,qd1,tau1\n{rows}")).unwrap();
-    log
+/// A folder with `still.csv`, a log with a joint at rest, which is a serious finding.
+fn still() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.log("still.csv", |time| {
+        [0.5, 0.0, (100.0 * time).rem_euclid(7.0)]
+    });
+    scratch
 }
 
 fn errors(output: &Output) -> String {
@@ -19,43 +19,39 @@ fn errors(output: &Output) -> String {
 
 #[test]
 fn a_quiet_run_prints_the_headline_alone() {
-    let log = still();
-    let output = residyn(&["audit", "--quiet", text(log.path())]);
+    let scratch = still();
+    let output = scratch.run("audit --quiet still.csv");
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8(output.stdout).unwrap();
-    let name = log.path().file_name().unwrap().to_str().unwrap();
     assert_eq!(said.lines().count(), 1, "{said}");
-    assert!(said.starts_with(&format!("{name}: ")), "{said}");
+    assert!(said.starts_with("still.csv: "), "{said}");
     assert!(said.contains(" serious, "), "{said}");
     // The flag's place does not matter, and the flag does not change what a program reads.
-    assert_eq!(
-        succeeds(&["-q", "check", "pendulum"]),
-        "pendulum: 0 finding(s)\n"
-    );
-    let plain = succeeds(&["check", "--json", "pendulum"]);
-    assert_eq!(succeeds(&["check", "-q", "--json", "pendulum"]), plain);
-    let refused = residyn(&["-q", "check", "nothing.toml"]);
-    assert!(errors(&refused).starts_with("error: nothing.toml"));
+    let said = scratch.succeeds("-q check pendulum");
+    assert_eq!(said, "pendulum: 0 finding(s)\n");
+    let plain = scratch.succeeds("check --json pendulum");
+    assert_eq!(scratch.succeeds("check -q --json pendulum"), plain);
+    let refused = scratch.refuses("-q check nothing.toml");
+    assert!(refused.starts_with("error: nothing.toml"));
 }
 
 #[test]
 fn a_verbose_run_says_how_long_its_stages_took() {
-    let log = still();
-    let output = residyn(&["audit", "-v", text(log.path())]);
+    let scratch = still();
+    let output = scratch.run("audit -v still.csv");
     let said = errors(&output);
     let is_stage = |line: &str| line.ends_with(" s  reading the logs");
     assert!(said.lines().any(is_stage), "{said}");
-    let plain = residyn(&["audit", text(log.path())]);
+    let plain = scratch.run("audit still.csv");
     assert_eq!(plain.stdout, output.stdout);
     assert_eq!(errors(&plain), "");
 }
 
 #[test]
 fn colours_are_for_terminals_alone() {
-    let log = still();
+    let scratch = still();
     let run = |set: &[(&str, &str)]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_residyn"));
-        command.args(["audit", text(log.path())]);
+        let mut command = scratch.command("audit still.csv");
         command.envs(set.iter().copied()).output().unwrap().stdout
     };
     let plain = run(&[]);
@@ -66,8 +62,9 @@ fn colours_are_for_terminals_alone() {
 
 #[test]
 fn a_pipe_that_closes_ends_the_program_quietly() {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_residyn"))
-        .args(["list", "effects"])
+    let scratch = Scratch::new();
+    let mut program = scratch
+        .command("list effects")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

@@ -9,19 +9,10 @@ use residyn_core::model::Model;
 use residyn_core::model::chain::{Chain, model_text};
 use residyn_formats::write_back;
 
-use crate::support::mechanisms::{comparable, fixture, mujoco_agrees, read_to, system};
-use crate::support::{refuses, residyn, succeeds, text};
-
-/// Descriptions with the last link of the chain.
-const FILES: [(&str, Option<&str>); 7] = [
-    ("planar_2r.urdf", None),
-    ("rounded_2r.urdf", None),
-    ("spatial_3r.urdf", None),
-    ("linkage_4r.urdf", Some("hand")),
-    ("rp.xml", None),
-    ("prr.xml", None),
-    ("geoms.xml", None),
-];
+use crate::support::catalogue::points;
+use crate::support::mechanisms::{FILES, comparable, fixture, mujoco_agrees, read_to, system};
+use crate::support::tables::rows;
+use crate::support::{Scratch, replaced, says, succeeds, text};
 
 /// The chain as a fit might find it: every body heavier and wider, more friction, and larger rotors if the format has
 /// rotors.
@@ -47,17 +38,9 @@ fn written(folder: &Path, file: &Path, tip: Option<&str>, values: &Chain) -> Pat
     let model = folder.join("model.toml");
     fs::write(&model, model_text(values)).unwrap();
     let out = folder.join(file.file_name().unwrap());
-    let mut arguments = vec![
-        "export",
-        "--model",
-        text(&model),
-        "--into",
-        text(file),
-        "--out",
-        text(&out),
-    ];
-    arguments.extend(tip.iter().flat_map(|tip| ["--tip", tip]));
-    succeeds(&arguments);
+    let into = ["export", "--model", text(&model), "--into", text(file)];
+    let tip = tip.map_or(vec![], |tip| vec!["--tip", tip]);
+    succeeds(&[&into[..], &["--out", text(&out)], &tip].concat());
     out
 }
 
@@ -65,21 +48,14 @@ fn written(folder: &Path, file: &Path, tip: Option<&str>, values: &Chain) -> Pat
 fn nothing_else_in_the_file_changes() {
     let folder = tempfile::tempdir().unwrap();
     for (name, tip) in FILES {
-        let original = fs::read_to_string(fixture(name)).unwrap();
-        let unchanged = written(
-            folder.path(),
-            &fixture(name),
-            tip,
-            &read_to(&fixture(name), tip),
-        );
-        assert_eq!(fs::read_to_string(unchanged).unwrap(), original, "{name}");
-        let out = written(
-            folder.path(),
-            &fixture(name),
-            tip,
-            &as_fitted(&fixture(name), tip),
-        );
-        let fitted = fs::read_to_string(out).unwrap();
+        let file = fixture(name);
+        let original = fs::read_to_string(&file).unwrap();
+        let with = |values: &Chain| {
+            let out = written(folder.path(), &file, tip, values);
+            fs::read_to_string(out).unwrap()
+        };
+        assert_eq!(with(&read_to(&file, tip)), original, "{name}");
+        let fitted = with(&as_fitted(&file, tip));
         let is_new = |line: &&str| !original.lines().any(|known| known == *line);
         let numbers = [
             "<inertial",
@@ -105,70 +81,35 @@ fn nothing_else_in_the_file_changes() {
     }
 }
 
-/// One link on one joint, lighter than the demo rig and without its friction.
-const ROD: &str = r#"<?xml version="1.0"?>
-<!-- From a drawing. -->
-<robot name="rod">
-  <link name="base"/>
-  <joint name="pivot" type="continuous">
-    <parent link="base"/> <child link="rod"/>
-    <axis xyz="0 1 0"/>
-  </joint>
-  <link name="rod">
-    <inertial>
-      <origin xyz="0 0 -0.3"/>
-      <mass value="1.0"/>
-      <inertia ixx="0.05" ixy="0" ixz="0" iyy="0.05" iyz="0" izz="0.001"/>
-    </inertial>
-  </link>
-</robot>
-"#;
+/// A model, the description that its values are to be written into, and words of the message.
+const REFUSED: &str = "
+fitted.toml   | $REPO/tests/fixtures/mechanisms/planar_2r.urdf  | has j1, j2, j3; give the file that the model was made from
+fitted.toml   | moved.urdf | its frames are not those of spatial_3R
+fitted.toml   | drawing.urdf | the root element is <svg>; give a URDF (<robot>) or an MJCF (<mujoco>)
+negative.toml | $REPO/tests/fixtures/mechanisms/spatial_3r.urdf | no physical bodies have the model's values: the logs do not determine them
+";
 
 #[test]
 fn files_that_the_model_was_not_made_from_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let chain = read_to(&fixture("spatial_3r.urdf"), None);
-    let model = folder.path().join("model.toml");
-    fs::write(&model, model_text(&chain)).unwrap();
-    let out = folder.path().join("out.urdf");
-    let says = |file: &Path, part: &str| {
-        let said = refuses(&[
-            "export",
-            "--model",
-            text(&model),
-            "--into",
-            text(file),
-            "--out",
-            text(&out),
-        ]);
-        assert!(
-            said.contains(part) && !out.exists(),
-            "{part:?} is missing in:\n{said}"
-        );
-    };
-    says(
-        &fixture("planar_2r.urdf"),
-        "has j1, j2, j3; give the file that the model was made from",
+    let scratch = Scratch::new();
+    let file = fixture("spatial_3r.urdf");
+    let fitted = model_text(&read_to(&file, None));
+    let negative = replaced(&fitted, "zz_3 = { value = ", "zz_3 = { value = -");
+    let original = fs::read_to_string(&file).unwrap();
+    scratch.file(
+        "negative.toml",
+        negative.replace("positive = true", "positive = false"),
     );
-    let original = fs::read_to_string(fixture("spatial_3r.urdf")).unwrap();
-    let other = folder.path().join("other.urdf");
-    fs::write(&other, original.replace("0.07 0.03 0.31", "0.07 0.03 0.32")).unwrap();
-    says(&other, "its frames are not those of spatial_3R");
-    fs::write(&other, "<svg/>").unwrap();
-    says(
-        &other,
-        "the root element is <svg>; give a URDF (<robot>) or an MJCF (<mujoco>)",
-    );
-    let none = model_text(&chain).replace("zz_3 = { value = ", "zz_3 = { value = -");
-    fs::write(&model, none.replace("positive = true", "positive = false")).unwrap();
-    says(
-        &fixture("spatial_3r.urdf"),
-        "no physical bodies have the model's values: the logs do not determine them",
-    );
-    let both = residyn(&[
-        "export", "--model", "pendulum", "--format", "urdf", "--into", "a.urdf", "--out", "b.urdf",
-    ]);
-    assert_eq!(both.status.code(), Some(2));
+    scratch.file("fitted.toml", fitted);
+    let moved = replaced(&original, "0.07 0.03 0.31", "0.07 0.03 0.32");
+    scratch.file("moved.urdf", moved);
+    scratch.file("drawing.urdf", "<svg/>");
+    for [model, file, words] in rows(REFUSED) {
+        let line = format!("export --model {model} --into {file} --out out.urdf");
+        says(&scratch.refuses(&line), &[&words]);
+    }
+    scratch.refuses("export --model pendulum --format urdf --into a.urdf --out out.urdf");
+    assert!(!scratch.has("out.urdf"));
 }
 
 #[test]
@@ -219,7 +160,7 @@ mod slow {
             }
             let [found, wanted] = [&again, &values].map(|chain| comparable(&system(chain)));
             let n = wanted.joints;
-            for point in crate::support::catalogue::points(&wanted, 100, 5) {
+            for point in points(&wanted, 100, 5) {
                 let moving = &point[..3 * n + 1];
                 let rates = |model: &residyn_core::model::Dynamics| {
                     model.program.eval(&[moving, &model.values()].concat())
@@ -242,54 +183,18 @@ mod slow {
 
     #[test]
     fn what_closing_the_loop_finds_is_in_the_description() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/demo.toml");
-        for (log, seed) in [("1.csv", "1"), ("2.csv", "2"), ("3.csv", "3")] {
-            succeeds(&[
-                "simulate",
-                "--plant",
-                plant,
-                "--seed",
-                seed,
-                "--out",
-                text(&at(log)),
-            ]);
-        }
-        fs::write(at("rod.urdf"), ROD).unwrap();
-        succeeds(&[
-            "new",
-            "--from-urdf",
-            text(&at("rod.urdf")),
-            "--out",
-            text(&at("rod.toml")),
-        ]);
-        let logs = ["1.csv", "2.csv", "3.csv"].map(at);
-        succeeds(&[
-            "closeloop",
-            "--model",
-            text(&at("rod.toml")),
-            "--train",
-            text(&logs[0]),
-            text(&logs[1]),
-            "--test",
-            text(&logs[2]),
-            "--out",
-            text(&at("report")),
-        ]);
-        let model = at("report/model.toml");
-        let out = at("fitted.urdf");
-        succeeds(&[
-            "export",
-            "--model",
-            text(&model),
-            "--into",
-            text(&at("rod.urdf")),
-            "--out",
-            text(&out),
-        ]);
-        assert_eq!(fs::read_to_string(at("rod.urdf")).unwrap(), ROD);
-        let joint = &read_to(&out, None).joints[0];
+        let scratch = Scratch::new();
+        scratch.simulates("$REPO/configs/demo.toml", &[1, 2, 3]);
+        // One link on one joint, lighter than the demo rig and without its friction.
+        let rod = include_str!("fixtures/rod.urdf");
+        scratch.file("rod.urdf", rod);
+        scratch.succeeds("new --from-urdf rod.urdf --out rod.toml");
+        let logs = "--train run1.csv run2.csv --test run3.csv";
+        scratch.succeeds(&format!("closeloop --model rod.toml {logs} --out report"));
+        scratch.succeeds("export --model report/model.toml --into rod.urdf --out fitted.urdf");
+        assert_eq!(scratch.read("rod.urdf"), rod);
+        let fitted = read_to(&scratch.path("fitted.urdf"), None);
+        let joint = &fitted.joints[0];
         assert!(
             (joint.drivetrain.friction - 0.16).abs() < 0.0016,
             "{joint:?}"
@@ -304,12 +209,12 @@ mod slow {
             "{joint:?}"
         );
         let library = Library::built_in();
-        let fitted = comparable(&read_model(&model, &library).unwrap());
-        let again = comparable(&system(&read_to(&out, None)));
-        for (fitted, again) in fitted.values().iter().zip(&again.values()) {
+        let model = read_model(scratch.path("report/model.toml"), &library).unwrap();
+        let [wanted, again] = [model, system(&fitted)].map(|model| comparable(&model).values());
+        for (wanted, again) in wanted.iter().zip(&again) {
             assert!(
-                (fitted - again).abs() <= 1e-12 * fitted.abs(),
-                "{fitted} {again}"
+                (wanted - again).abs() <= 1e-12 * wanted.abs(),
+                "{wanted} {again}"
             );
         }
     }

@@ -1,64 +1,40 @@
 //! Two explanations that the logs cannot distinguish: the experiment that the report proposes does, if there is one.
 
-use std::path::{Path, PathBuf};
+use std::ops::Range;
 
 use serde_json::Value;
 
-use crate::support::{succeeds, text};
+use crate::support::Scratch;
+use crate::support::reports::names;
 
-/// A plant file: a model, its one hidden effect, then excitation, noise and start.
-fn plant(
-    folder: &Path,
+/// Logs of a plant, one per seed, such as `swing1.csv`. Its file has a model, its one hidden effect, then excitation,
+/// noise and start.
+fn record(
+    scratch: &Scratch,
     name: &str,
     [model, effect, torque, start]: [&str; 4],
     noise: f64,
-) -> PathBuf {
-    let path = folder.join(name);
+    duration_s: u32,
+    seeds: Range<u32>,
+) {
     let plant = format!(
         "model = {model}\n[[effect]]\njoint = 1\n{effect}\n\
          [sensor]\nrate_hz = 100\nposition_noise = {noise}\nposition_step = 0\n\
          [excitation]\n{torque}\n[recording]\nlogs = 1\nduration_s = 6\nstart = {start}\n"
     );
-    std::fs::write(&path, plant).unwrap();
-    path
-}
-
-/// Logs of a plant, one per seed.
-fn record(plant: &Path, seeds: std::ops::Range<u32>, duration_s: &str) -> Vec<String> {
-    let log = |seed: u32| {
-        let seed = seed.to_string();
-        let out = plant.with_extension(format!("{seed}.csv"));
-        let arguments = [
-            "--seed",
-            &seed,
-            "--duration",
-            duration_s,
-            "--out",
-            text(&out),
-        ];
-        succeeds(&[&["simulate", "--plant", text(plant)], &arguments[..]].concat());
-        text(&out).to_owned()
-    };
-    seeds.map(log).collect()
-}
-
-fn report(model: &str, train: &[String], test: &[String]) -> Value {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("report");
-    let mut arguments = vec!["closeloop", "--json", "--model", model, "--out", text(&out)];
-    for (flag, logs) in [("--train", train), ("--test", test)] {
-        arguments.push(flag);
-        arguments.extend(logs.iter().map(String::as_str));
+    scratch.file(&format!("{name}.toml"), plant);
+    for seed in seeds {
+        let own = format!("--plant {name}.toml --seed {seed} --out {name}{seed}.csv");
+        scratch.succeeds(&format!("simulate --duration {duration_s} {own}"));
     }
-    serde_json::from_str(&succeeds(&arguments)).unwrap()
 }
 
-fn effects(report: &Value) -> Vec<&str> {
-    let effects = report["effects"].as_array().unwrap();
-    effects
-        .iter()
-        .map(|e| e["name"].as_str().unwrap())
-        .collect()
+/// Of six logs, the last two are for the test; `more` are for training, too.
+fn report(scratch: &Scratch, model: &str, name: &str, more: &str) -> Value {
+    let log = |k: u32| format!("{name}{k}.csv");
+    let [a, b, c, d, e, f] = [1, 2, 3, 4, 5, 6].map(log);
+    let logs = format!("--train {a} {b} {c} {d} {more} --test {e} {f}");
+    scratch.json(&format!("closeloop --model {model} {logs} --out report"))
 }
 
 /// The alternative that has this effect.
@@ -76,22 +52,21 @@ fn alternative<'r>(report: &'r Value, effect: &str) -> Option<&'r Value> {
 /// Small swings at one speed: friction proportional to speed and drag proportional to its square look the same.
 #[test]
 fn the_proposed_experiment_tells_what_the_logs_did_not() {
-    let folder = tempfile::tempdir().unwrap();
-    let rig = |name, torque, start| {
+    let scratch = Scratch::new();
+    let rig = |torque, start| {
         let said = [
             "\"pendulum\"\n[parameters]\nC_g = -17.4\nC_i = 4.6",
             "name = \"viscous_friction\"\nb = 0.03",
         ];
-        plant(folder.path(), name, [said[0], said[1], torque, start], 3e-3)
+        [said[0], said[1], torque, start]
     };
     let swinging = rig(
-        "swing.toml",
         "amplitude = [0.3]\nband_hz = [0.5, 0.6]\ntones = 1",
         "[0, 0]",
     );
-    let (train, test) = (record(&swinging, 1..5, "6"), record(&swinging, 5..7, "6"));
-    let before = report("pendulum", &train, &test);
-    assert_eq!(effects(&before), ["viscous_friction"]);
+    record(&scratch, "swing", swinging, 3e-3, 6, 1..7);
+    let before = report(&scratch, "pendulum", "swing", "");
+    assert_eq!(names(&before), ["viscous_friction"]);
     let doubtful = alternative(&before, "quadratic_drag").expect("the logs do not tell");
     let (words, numbers) = (
         doubtful["experiment"].as_str().unwrap(),
@@ -109,16 +84,14 @@ fn the_proposed_experiment_tells_what_the_logs_did_not() {
     );
     assert!((rad("noise_rad") - 3e-3).abs() < 3e-4, "{numbers}");
 
-    let coasting = rig(
-        "coast.toml",
-        "amplitude = [0]\nband_hz = [0.5, 0.6]\ntones = 1",
-        &format!("[0, {speed}]"),
-    );
+    let start = format!("[0, {speed}]");
+    let coasting = rig("amplitude = [0]\nband_hz = [0.5, 0.6]\ntones = 1", &start);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few seconds
     let logs = (numbers["seconds"].as_f64().unwrap() / 2.0).ceil() as u32;
-    let more = record(&coasting, 0..logs, "2");
-    let after = report("pendulum", &[train, more].concat(), &test);
-    assert_eq!(effects(&after), ["viscous_friction"]);
+    record(&scratch, "coast", coasting, 3e-3, 2, 0..logs);
+    let more: String = (0..logs).map(|seed| format!("coast{seed}.csv ")).collect();
+    let after = report(&scratch, "pendulum", "swing", &more);
+    assert_eq!(names(&after), ["viscous_friction"]);
     assert!(
         alternative(&after, "quadratic_drag").is_none(),
         "{}",
@@ -128,27 +101,21 @@ fn the_proposed_experiment_tells_what_the_logs_did_not() {
 
 /// A drive that delivers less and a rotor that takes more: the same acceleration. Only another mass distinguishes them.
 fn sled(parameters: &str, mass: &str) -> (Value, Value) {
-    let folder = tempfile::tempdir().unwrap();
-    let model = folder.path().join("sled.model.toml");
+    let scratch = Scratch::new();
     let declared = format!(
         "[system]\nname = \"sled\"\njoints = 1\nprismatic = [1]\n{parameters}\n[dynamics]\nmass = [[\"{mass}\"]]\nbias = [\"0\"]\n"
     );
-    std::fs::write(&model, declared).unwrap();
-    let (named, torque) = (
-        format!("{:?}", text(&model)),
-        "amplitude = [2]\nband_hz = [0.3, 2]\ntones = 5",
-    );
-    let said = [
-        named.as_str(),
+    scratch.file("sled.model.toml", declared);
+    let sled = [
+        "\"sled.model.toml\"",
         "name = \"actuator_gain\"\ng = -0.2",
-        torque,
+        "amplitude = [2]\nband_hz = [0.3, 2]\ntones = 5",
         "[0, 0]",
     ];
-    let sled = plant(folder.path(), "sled.toml", said, 1e-3);
-    let (train, test) = (record(&sled, 1..5, "6"), record(&sled, 5..7, "6"));
+    record(&scratch, "sled", sled, 1e-3, 6, 1..7);
     let close = || {
-        let report = report(text(&model), &train, &test);
-        let other = if effects(&report) == ["rotor_inertia"] {
+        let report = report(&scratch, "sled.model.toml", "sled", "");
+        let other = if names(&report) == ["rotor_inertia"] {
             "actuator_gain"
         } else {
             "rotor_inertia"

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use rand::RngExt;
@@ -16,6 +16,8 @@ use tempfile::TempDir;
 
 use crate::support::catalogue::rng;
 use crate::support::clients::{succeeds, there_are};
+use crate::support::paths::ours;
+use crate::support::predictions::agree;
 use crate::support::{exported_models, mechanisms};
 
 /// Every function of formulas, reserved names of C, and text that would end a comment.
@@ -79,18 +81,10 @@ impl Header {
 
     /// A client compiled with these flags.
     fn program(&self, client: &str, flags: &[&str]) -> PathBuf {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let program = self.folder.path().join("client");
         let mut command = Command::new("cc");
-        command
-            .args(["-std=c99"])
-            .args(flags)
-            .args(self.arguments());
-        command
-            .arg(root.join(client))
-            .arg("-o")
-            .arg(&program)
-            .arg("-lm");
+        command.arg("-std=c99").args(flags).args(self.arguments());
+        command.arg(ours(client)).arg("-o").arg(&program).arg("-lm");
         succeeds(&mut command, self.name);
         program
     }
@@ -182,41 +176,32 @@ fn predictions(header: &Header, flags: &[&str], samples: &Samples) -> Prediction
 
 #[test]
 fn the_compiled_header_predicts_what_the_program_does() {
+    let format = find("c").unwrap();
     for header in headers(&["cc"]) {
         let samples = header.model.samples(&mut rng(3)).unwrap();
         let own = header.model.predict(&samples).unwrap();
-        let theirs = find("c")
-            .unwrap()
-            .predict(&header.path(), &samples)
-            .unwrap();
-        let difference = own.difference(&theirs);
-        assert!(
-            difference.pointwise() <= 1e-9,
-            "{} {difference:?}",
-            header.name
-        );
-        assert!(
-            difference.rollout.unwrap() <= 1e-9,
-            "{} {difference:?}",
-            header.name
-        );
-        assert!(difference.next.is_some() && difference.derivative.is_some());
+        let theirs = format.predict(&header.path(), &samples).unwrap();
+        agree(header.name, &own, &theirs, 1e-9);
+    }
+}
+
+/// Every model's header, compiled with flags for its name, predicts single points as the program does.
+fn agrees_at_points(seed: u64, flags: impl Fn(&str) -> Vec<String>, tolerance: f64) {
+    for header in headers(&["cc"]) {
+        let samples = header.model.samples(&mut rng(seed)).unwrap();
+        let own = header.model.predict(&samples).unwrap();
+        let flags = flags(&header.model.name().to_uppercase());
+        let flags: Vec<&str> = flags.iter().map(String::as_str).collect();
+        let difference = own.difference(&predictions(&header, &flags, &samples));
+        let is_near = difference.pointwise() <= tolerance;
+        assert!(is_near, "{} {difference:?}", header.name);
     }
 }
 
 #[test]
 fn the_header_in_float_agrees_to_single_precision() {
-    for header in headers(&["cc"]) {
-        let samples = header.model.samples(&mut rng(4)).unwrap();
-        let own = header.model.predict(&samples).unwrap();
-        let float = format!("-D{}_FLOAT", header.model.name().to_uppercase());
-        let difference = own.difference(&predictions(&header, &["-O2", &float], &samples));
-        assert!(
-            difference.pointwise() <= 1e-5,
-            "{} {difference:?}",
-            header.name
-        );
-    }
+    let float = |name: &str| vec!["-O2".to_owned(), format!("-D{name}_FLOAT")];
+    agrees_at_points(4, float, 1e-5);
 }
 
 #[test]
@@ -226,16 +211,7 @@ fn the_header_has_no_invalid_access_or_undefined_behaviour() {
         "-fsanitize=address,undefined",
         "-fno-sanitize-recover=all",
     ];
-    for header in headers(&["cc"]) {
-        let samples = header.model.samples(&mut rng(5)).unwrap();
-        let own = header.model.predict(&samples).unwrap();
-        let difference = own.difference(&predictions(&header, &flags, &samples));
-        assert!(
-            difference.pointwise() <= 1e-9,
-            "{} {difference:?}",
-            header.name
-        );
-    }
+    agrees_at_points(5, |_| flags.map(str::to_owned).to_vec(), 1e-9);
 }
 
 #[test]
@@ -274,10 +250,7 @@ fn no_compiler_warns() {
                     .args(&language[1..])
                     .args(strict)
                     .args(header.arguments());
-                for source in [
-                    main.clone(),
-                    Path::new(env!("CARGO_MANIFEST_DIR")).join(CLIENT),
-                ] {
+                for source in [main.clone(), ours(CLIENT)] {
                     let mut one = Command::new(language[0]);
                     one.args(command.get_args()).arg("-c").arg(source);
                     one.arg("-o").arg(header.folder.path().join("main.o"));

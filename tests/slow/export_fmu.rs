@@ -11,6 +11,7 @@ use crate::support::catalogue::rng;
 use crate::support::clients::{client, succeeds, there_are};
 use crate::support::exported_models;
 use crate::support::predictions::predictions;
+use crate::support::{Scratch, says};
 
 fn model(name: &str) -> ExportModel {
     let mut models = exported_models::all().into_iter();
@@ -54,21 +55,16 @@ fn a_simulator_predicts_what_the_program_does() {
 /// An independent solver may differ by the step's own error and by the error of straight lines through a delay.
 #[test]
 fn a_simulator_can_tune_save_and_differentiate_a_unit() {
-    for ((name, parameter, tuned, solver_tolerance), format) in each(vec![
-        (
-            "pendulum_effects",
-            "joint[1].coulomb_friction.F_c1",
-            0.05,
-            2e-3,
-        ),
-        (
-            "acrobot_effects",
-            "joint[1].stribeck_friction.F_s1",
-            0.3,
-            2e-3,
-        ),
+    let (dry, stribeck) = (
+        "joint[1].coulomb_friction.F_c1",
+        "joint[1].stribeck_friction.F_s1",
+    );
+    let cases = vec![
+        ("pendulum_effects", dry, 0.05, 2e-3),
+        ("acrobot_effects", stribeck, 0.3, 2e-3),
         ("cartpole_hybrid", "m_p", 0.2, 1e-4),
-    ]) {
+    ];
+    for ((name, parameter, tuned, solver_tolerance), format) in each(cases) {
         let model = model(name);
         let samples = model.samples(&mut rng(5)).unwrap();
         let own = parameter.rsplit('.').next().unwrap();
@@ -82,14 +78,11 @@ fn a_simulator_can_tune_save_and_differentiate_a_unit() {
             "other_value": tuned, "other_rollout": other.predict(&samples).unwrap().rollout,
             "solver_tolerance": solver_tolerance,
         });
-        let folder = tempfile::tempdir().unwrap();
-        let (path, question) = (
-            folder.path().join("model.fmu"),
-            folder.path().join("case.json"),
-        );
+        let scratch = Scratch::new();
+        let path = scratch.path("model.fmu");
         format.write(&model, &path).unwrap();
-        std::fs::write(&question, case.to_string()).unwrap();
-        client("simulator.py", &[&path, &question]);
+        scratch.file("case.json", case.to_string());
+        client("simulator.py", &[&path, &scratch.path("case.json")]);
     }
 }
 
@@ -174,45 +167,21 @@ fn the_description_names_units_effects_and_intervals() {
 #[test]
 fn without_a_compiler_a_unit_holds_its_sources() {
     for format in formats() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("acrobot.fmu");
-        let run = Command::new(env!("CARGO_BIN_EXE_residyn"))
-            .env("CC", "no-such-compiler")
-            .args([
-                "export",
-                "--model",
-                "acrobot",
-                "--json",
-                "--format",
-                format.name,
-                "--out",
-            ])
-            .arg(&path)
-            .output()
-            .unwrap();
-        assert_eq!(
-            run.status.code(),
-            Some(0),
-            "{}",
-            String::from_utf8_lossy(&run.stderr)
-        );
+        let scratch = Scratch::new();
+        let given = format!("--model acrobot --format {} --out acrobot.fmu", format.name);
+        let mut export = scratch.command(&format!("export --json {given}"));
+        let run = export.env("CC", "no-such-compiler").output().unwrap();
+        let errors = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(0), "{errors}");
         let said: Value = serde_json::from_slice(&run.stdout).unwrap();
         let limit = said["not_carried"][0].as_str().unwrap();
-        assert!(limit.contains("source") && limit.contains("CC"), "{limit}");
-        assert!(
-            said["not_measured"].as_str().unwrap().contains("CC"),
-            "{said}"
-        );
-        let archive = ZipArchive::new(std::fs::File::open(&path).unwrap()).unwrap();
+        says(limit, &["source", "CC"]);
+        says(said["not_measured"].as_str().unwrap(), &["CC"]);
+        let file = std::fs::File::open(scratch.path("acrobot.fmu")).unwrap();
+        let archive = ZipArchive::new(file).unwrap();
         let names: Vec<_> = archive.file_names().flatten().collect();
-        assert!(
-            names.iter().any(|name| name == "sources/unit.h"),
-            "{names:?}"
-        );
-        assert!(
-            !names.iter().any(|name| name.starts_with("binaries/")),
-            "{names:?}"
-        );
+        let has = |begins: &str| names.iter().any(|name| name.starts_with(begins));
+        assert!(has("sources/unit.h") && !has("binaries/"), "{names:?}");
     }
 }
 

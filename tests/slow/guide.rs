@@ -6,14 +6,11 @@ use std::process::Command;
 use std::thread;
 
 use crate::support::measured;
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
+use crate::support::paths::ours;
 
 /// The Markdown files of a folder.
 fn markdown(folder: &str) -> Vec<PathBuf> {
-    let entries = fs::read_dir(root().join(folder)).unwrap();
+    let entries = fs::read_dir(ours(folder)).unwrap();
     let files = entries.map(|entry| entry.unwrap().path());
     files
         .filter(|path| path.extension() == Some("md".as_ref()))
@@ -58,7 +55,7 @@ fn run(commands: &str, folder: &Path) -> Result<Option<String>, String> {
         .args(["-euo", "pipefail", "-c"])
         .arg(format!("exec 2>&1\n{commands}"))
         .env("PATH", format!("{}:{path}", program.display()))
-        .env("REPO", root())
+        .env("REPO", env!("CARGO_MANIFEST_DIR"))
         .current_dir(folder)
         .output()
         .unwrap();
@@ -150,7 +147,7 @@ fn is_alike(shown: &str, printed: &str) -> bool {
 #[test]
 fn every_command_prints_what_its_page_says() {
     let mut pages = markdown("docs/guide");
-    pages.push(root().join("docs/guide.md"));
+    pages.push(ours("docs/guide.md"));
     assert!(pages.len() >= 10, "{pages:?}");
     let failures: Vec<String> = thread::scope(|scope| {
         let runs: Vec<_> = pages

@@ -8,9 +8,8 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use serde_json::Value;
-use tempfile::TempDir;
 
-use crate::support::{answers, residyn_within, succeeds, text};
+use crate::support::{Scratch, residyn_within, text};
 
 /// A row of a pendulum with gravity and friction, driven by two sines, in the digits of a logger that prints doubles.
 fn row(time: f64) -> [f64; 3] {
@@ -56,25 +55,24 @@ fn a_large_log_is_read_and_audited_in_twice_its_size() {
     assert_eq!(audit[0]["examined_rows"], 262_144);
 }
 
-/// A folder with `count` logs of a second, each of another part of the motion.
-fn logs(count: usize) -> (TempDir, Vec<String>) {
-    let folder = tempfile::tempdir().unwrap();
+/// Writes `count` logs of a second, each of another part of the motion, and returns their paths.
+fn write_logs(folder: &Path, count: usize) -> Vec<String> {
     let log = |k: usize| {
-        let path = folder.path().join(format!("run{k}.csv"));
+        let path = folder.join(format!("run{k}.csv"));
         write_log(&path, 120, 0.01, 7.3 * k as f64);
         text(&path).to_owned()
     };
-    let logs = (0..count).map(log).collect();
-    (folder, logs)
+    (0..count).map(log).collect()
 }
 
 #[test]
 #[cfg(unix)]
 fn a_thousand_logs_are_audited_and_predicted_in_one_call() {
-    let (_folder, logs) = logs(1000);
-    let logs: Vec<&str> = logs.iter().map(String::as_str).collect();
+    let scratch = Scratch::new();
+    let logs = write_logs(scratch.folder(), 1000);
     let within = |arguments: &[&str]| -> Value {
-        let all = [arguments, &logs].concat();
+        let logs = logs.iter().map(String::as_str);
+        let all: Vec<&str> = arguments.iter().copied().chain(logs).collect();
         let output = residyn_within(400_000, &all);
         let errors = String::from_utf8_lossy(&output.stderr);
         assert!(matches!(output.status.code(), Some(0 | 1)), "{errors}");
@@ -100,25 +98,15 @@ fn write_effects(folder: &Path, count: usize) {
 
 #[test]
 fn a_library_of_five_hundred_effects_is_searched_within_its_time() {
-    let (folder, logs) = logs(12);
-    let effects = folder.path().join("effects");
-    fs::create_dir(&effects).unwrap();
-    write_effects(&effects, 500);
-    let listed = succeeds(&["list", "effects", "--effects", text(&effects)]);
+    let scratch = Scratch::new();
+    write_logs(scratch.folder(), 12);
+    fs::create_dir(scratch.path("effects")).unwrap();
+    write_effects(&scratch.path("effects"), 500);
+    let listed = scratch.succeeds("list effects --effects effects");
     assert_eq!(listed.matches("wave number").count(), 500);
-    let out = folder.path().join("report");
-    let logs: Vec<&str> = logs.iter().map(String::as_str).collect();
-    let closed = [
-        "closeloop",
-        "--json",
-        "--model",
-        "pendulum",
-        "--budget",
-        "5s",
-        "--effects",
-        text(&effects),
-    ];
-    let json = answers(&[&closed[..], &["--out", text(&out), "--train"], &logs].concat());
+    let logs: String = (0..12).map(|k| format!(" run{k}.csv")).collect();
+    let given = format!("--model pendulum --budget 5s --effects effects --train{logs}");
+    let json = scratch.answers(&format!("closeloop --json --out report {given}"));
     let report: Value = serde_json::from_str(&json).unwrap();
     assert!(report["effects"].is_array());
 }

@@ -1,90 +1,69 @@
 //! Closing the loop on logs measured on real rigs. README says where the data are.
 
+use std::fs;
+
 use serde_json::Value;
 
-use crate::support::{answers, measured, succeeds, text};
+use crate::support::reports::{error_of_joint, names};
+use crate::support::{Scratch, measured};
 
-/// Close the loop with these arguments and return its report.
-fn report(arguments: &[&str]) -> Value {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("report");
-    let all = [&["closeloop", "--json", "--out", text(&out)], arguments].concat();
-    serde_json::from_str(&answers(&all)).expect("the report is JSON")
+/// A folder with these logs of a set; `None` if it is not there.
+fn with_logs(set: &str, logs: &[&str]) -> Option<Scratch> {
+    let (data, scratch) = (measured(set)?, Scratch::new());
+    for log in logs {
+        fs::copy(data.join(log), scratch.path(log)).unwrap();
+    }
+    Some(scratch)
+}
+
+/// The report of closing the loop with these words.
+fn report(scratch: &Scratch, given: &str) -> Value {
+    let line = format!("closeloop --json --out report {given}");
+    serde_json::from_str(&scratch.answers(&line)).expect("the report is JSON")
 }
 
 /// Position error at 0.5 s, after the loop is closed relative to before.
 fn ratio(report: &Value, joint: usize) -> f64 {
-    let rmse = |model: &str| {
-        report["error"][model]["position_rmse"][1][joint]
-            .as_f64()
-            .unwrap()
-    };
-    assert_eq!(report["error"]["horizons_s"][1], 0.5);
-    rmse("after") / rmse("before")
-}
-
-fn names(report: &Value) -> Vec<String> {
-    let effects = report["effects"].as_array().unwrap();
-    effects
-        .iter()
-        .map(|e| e["name"].as_str().unwrap().to_owned())
-        .collect()
+    let [before, after] = ["before", "after"].map(|model| error_of_joint(report, model, joint));
+    after / before
 }
 
 #[test]
 fn dry_friction_is_found_in_a_geared_pendulum() {
-    let Some(data) = measured("dfki_simple_pendulum") else {
+    let [ddp, collocation, energy, ilqr] = [
+        "ddp_pd_tracking.csv",
+        "direct_collocation_pd_tracking.csv",
+        "energy_shaping.csv",
+        "ilqr_20210706.csv",
+    ];
+    let all = [ddp, collocation, energy, ilqr];
+    let Some(scratch) = with_logs("dfki_simple_pendulum", &all) else {
         return;
     };
-    let log = |name: &str| data.join(name).to_str().unwrap().to_owned();
-    let (ddp, collocation) = (
-        log("ddp_pd_tracking.csv"),
-        log("direct_collocation_pd_tracking.csv"),
-    );
-    let (energy, ilqr) = (log("energy_shaping.csv"), log("ilqr_20210706.csv"));
-    let pushed = |t: &str| format!("energy_shaping.csv@{t}");
-    let touched = [pushed("7.2-7.6"), pushed("11.5-12.4"), pushed("15.8-16.4")];
-    let report = report(&[
-        "--model",
-        "pendulum",
-        "--train",
-        &ddp,
-        &collocation,
-        &energy,
-        "--test",
-        &ilqr,
-        "--leave-out",
-        &touched[0],
-        &touched[1],
-        &touched[2],
-    ]);
+    let touched = ["7.2-7.6", "11.5-12.4", "15.8-16.4"].map(|span| format!("{energy}@{span}"));
+    let logs = format!("--train {ddp} {collocation} {energy} --test {ilqr}");
+    let left_out = touched.join(" ");
+    let given = format!("--model pendulum {logs} --leave-out {left_out}");
+    let report = report(&scratch, &given);
     let found = names(&report);
     let dry = [
         "coulomb_friction",
         "stribeck_friction",
         "asymmetric_friction",
     ];
-    assert!(
-        found.iter().any(|name| dry.contains(&name.as_str())),
-        "{found:?}"
-    );
+    assert!(found.iter().any(|name| dry.contains(name)), "{found:?}");
     assert!(ratio(&report, 0) <= 0.7, "{}", ratio(&report, 0));
-    assert_eq!(
-        report["logs"]["train"][2]["leave_out"]
-            .as_array()
-            .unwrap()
-            .len(),
-        3
-    );
+    let left_out = &report["logs"]["train"][2]["leave_out"];
+    assert_eq!(left_out.as_array().unwrap().len(), 3);
 }
 
 #[test]
 fn friction_is_found_in_a_pendulum_that_swings_freely() {
-    let Some(data) = measured("multiarm_single_pendulum") else {
+    let log = "free_swing_identification.csv";
+    let Some(scratch) = with_logs("multiarm_single_pendulum", &[log]) else {
         return;
     };
-    let log = data.join("free_swing_identification.csv");
-    let report = report(&["--model", "pendulum", "--train", text(&log)]);
+    let report = report(&scratch, &format!("--model pendulum --train {log}"));
     assert!(!names(&report).is_empty());
     assert!(ratio(&report, 0) <= 0.3, "{}", ratio(&report, 0));
     // Without torque, only ratios to the inertia can be determined.
@@ -94,52 +73,34 @@ fn friction_is_found_in_a_pendulum_that_swings_freely() {
 
 #[test]
 fn the_loop_closes_on_a_double_pendulum() {
-    let Some(data) = measured("dfki_double_pendulum_c1") else {
+    let [a, b, test] = [
+        "sysid_143339.csv",
+        "sysid_143601.csv",
+        "pendubot_tvlqr_01.csv",
+    ];
+    let Some(scratch) = with_logs("dfki_double_pendulum_c1", &[a, b, test]) else {
         return;
     };
-    let log = |name: &str| data.join(name).to_str().unwrap().to_owned();
-    let (a, b) = (log("sysid_143339.csv"), log("sysid_143601.csv"));
-    let report = report(&[
-        "--model",
-        "acrobot",
-        "--train",
-        &a,
-        &b,
-        "--test",
-        &log("pendubot_tvlqr_01.csv"),
-    ]);
+    let given = format!("--model acrobot --train {a} {b} --test {test}");
+    let report = report(&scratch, &given);
     assert_eq!(report["joints"], 2);
     assert!(!names(&report).is_empty());
     assert!(ratio(&report, 1) < 1.0, "{}", ratio(&report, 1));
-    let of_torques = |model: &str| report["torque"][model]["relative"].as_f64().unwrap();
-    assert!(
-        of_torques("after") < of_torques("before"),
-        "{}",
-        report["torque"]
-    );
-    assert_eq!(
-        report["torque"]["as_declared"]["rms"]
-            .as_array()
-            .unwrap()
-            .len(),
-        2
-    );
+    let torque = &report["torque"];
+    let of_torques = |model: &str| torque[model]["relative"].as_f64().unwrap();
+    assert!(of_torques("after") < of_torques("before"), "{torque}");
+    let declared = &torque["as_declared"]["rms"];
+    assert_eq!(declared.as_array().unwrap().len(), 2);
 }
-
-/// Parameters of the lab's own identification from `pd_system_identification.csv`.
-const PUBLISHED: &str = concat!(
-    env!("CARGO_MANIFEST_DIR"),
-    "/docs/rigs/dfki_simple_pendulum_published.toml"
-);
 
 #[test]
 fn a_log_that_misled_an_identification_is_told_from_a_good_one() {
-    let Some(data) = measured("dfki_simple_pendulum") else {
+    let (poor, good) = ("pd_system_identification.csv", "ddp_pd_tracking.csv");
+    let Some(scratch) = with_logs("dfki_simple_pendulum", &[poor, good]) else {
         return;
     };
     let findings = |log: &str| {
-        let log = data.join(log);
-        let json = answers(&["audit", "--json", "--model", "pendulum", text(&log)]);
+        let json = scratch.answers(&format!("audit --json --model pendulum {log}"));
         let audits: Value = serde_json::from_str(&json).unwrap();
         audits[0]["findings"].as_array().unwrap().clone()
     };
@@ -149,7 +110,7 @@ fn a_log_that_misled_an_identification_is_told_from_a_good_one() {
         };
         findings.iter().find(fits).is_some()
     };
-    let poor = findings("pd_system_identification.csv");
+    let poor = findings(poor);
     for (severity, words) in [
         ("serious", "tau1 chatters: 2.2"),
         ("warning", "disagree with dq1/dt"),
@@ -159,27 +120,22 @@ fn a_log_that_misled_an_identification_is_told_from_a_good_one() {
     ] {
         assert!(says(&poor, severity, words), "{words}: {poor:#?}");
     }
-    let good = findings("ddp_pd_tracking.csv");
+    let good = findings(good);
     assert!(good.iter().all(|f| f["severity"] != "serious"), "{good:#?}");
     assert!(!says(&good, "warning", "the motion explains"), "{good:#?}");
 }
 
+/// Parameters of the lab's own identification from `pd_system_identification.csv`.
 #[test]
 fn published_values_fail_on_other_logs_and_the_report_says_which() {
-    let Some(data) = measured("dfki_simple_pendulum") else {
+    let [train, test] = ["ddp_pd_tracking.csv", "direct_collocation_pd_tracking.csv"];
+    let Some(scratch) = with_logs("dfki_simple_pendulum", &[train, test]) else {
         return;
     };
-    let log = |name: &str| data.join(name).to_str().unwrap().to_owned();
-    let report = report(&[
-        "--model",
-        PUBLISHED,
-        "--train",
-        &log("ddp_pd_tracking.csv"),
-        "--test",
-        &log("direct_collocation_pd_tracking.csv"),
-        "--against",
-        PUBLISHED,
-    ]);
+    let published = "$REPO/docs/rigs/dfki_simple_pendulum_published.toml";
+    let logs = format!("--train {train} --test {test}");
+    let given = format!("--model {published} {logs} --against {published}");
+    let report = report(&scratch, &given);
     let error = &report["error"];
     let rmse = |model: &Value| model["position_rmse"][1][0].as_f64().unwrap();
     assert_eq!(rmse(&error["against"][0]), rmse(&error["declared"]));
@@ -199,22 +155,13 @@ fn published_values_fail_on_other_logs_and_the_report_says_which() {
 
 #[test]
 fn published_models_of_a_double_pendulum_are_scored_as_they_are() {
-    let Some(data) = measured("dfki_double_pendulum_c1") else {
+    let log = "acrobot_tvlqr_01.csv";
+    let Some(scratch) = with_logs("dfki_double_pendulum_c1", &[log]) else {
         return;
     };
-    let log = data.join("acrobot_tvlqr_01.csv");
     for number in ["1", "2"] {
-        let rigs = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/rigs");
-        let model = format!("{rigs}/dfki_double_pendulum_c1_model_{number}.toml");
-        let json = succeeds(&[
-            "evaluate",
-            "--json",
-            "--model",
-            &model,
-            "--test",
-            text(&log),
-        ]);
-        let error: Value = serde_json::from_str(&json).unwrap();
+        let model = format!("$REPO/docs/rigs/dfki_double_pendulum_c1_model_{number}.toml");
+        let error = scratch.json(&format!("evaluate --model {model} --test {log}"));
         assert_eq!(error["diverged"], serde_json::json!([0, 0, 0]));
         // A wrong sign of gravity or friction costs many times this over half a second.
         for joint in 0..2 {

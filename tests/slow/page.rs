@@ -2,10 +2,9 @@
 
 use std::fs;
 
+use crate::support::Scratch;
 use crate::support::clients::look_at;
 use crate::support::demo::demo;
-use crate::support::paths::configs;
-use crate::support::{refuses, succeeds, text};
 
 #[test]
 fn a_browser_shows_the_page_of_the_demo() {
@@ -14,43 +13,19 @@ fn a_browser_shows_the_page_of_the_demo() {
 
 #[test]
 fn a_browser_shows_the_page_of_an_experiment_on_control() {
-    let folder = tempfile::tempdir().unwrap();
-    let config = configs().join("smoke/undeclared-effect.toml");
-    let arguments = ["experiment", "undeclared-effect", "--config", text(&config)];
-    succeeds(&[&arguments[..], &["--out", text(folder.path())]].concat());
-    look_at(&folder.path().join("report.html"));
+    let scratch = Scratch::new();
+    let config = "--config $REPO/configs/smoke/undeclared-effect.toml";
+    scratch.succeeds(&format!("experiment undeclared-effect {config} --out out"));
+    look_at(&scratch.path("out/report.html"));
 }
 
 #[test]
 fn page_and_text_are_made_again_from_report_json_alone() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::copy(
-        demo().join("report.json"),
-        folder.path().join("report.json"),
-    )
-    .unwrap();
-    succeeds(&["report", text(folder.path())]);
+    let scratch = Scratch::new();
+    fs::copy(demo().join("report.json"), scratch.path("report.json")).unwrap();
+    scratch.succeeds("report .");
     for name in ["report.html", "report.md"] {
-        let [first, again] =
-            [demo(), folder.path()].map(|at| fs::read_to_string(at.join(name)).unwrap());
-        assert!(first == again, "the two {name} differ");
+        let first = fs::read_to_string(demo().join(name)).unwrap();
+        assert!(first == scratch.read(name), "the two {name} differ");
     }
-}
-
-#[test]
-fn folders_without_a_report_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let said = refuses(&["report", text(folder.path())]);
-    assert!(
-        said.contains("report.json") && said.contains("residyn closeloop"),
-        "{said}"
-    );
-    fs::write(
-        folder.path().join("report.json"),
-        "{\"schema\": 1,\n nonsense}",
-    )
-    .unwrap();
-    let said = refuses(&["report", text(folder.path())]);
-    assert!(said.contains("line 2 column"), "{said}");
-    assert!(!folder.path().join("report.html").exists());
 }

@@ -1,8 +1,6 @@
 //! Effects that no log shows alone: all of them act at each speed and each angle.
 
-use serde_json::Value;
-
-use crate::support::{succeeds, text};
+use crate::support::Scratch;
 
 /// A pendulum, how it is driven and read, and its friction.
 struct Rig {
@@ -74,22 +72,11 @@ impl Rig {
 #[test]
 fn friction_of_three_kinds_is_named_as_such() {
     for (k, rig) in RIGS.iter().enumerate() {
-        let folder = tempfile::tempdir().unwrap();
-        let plant = folder.path().join("rig.toml");
-        std::fs::write(&plant, rig.plant()).unwrap();
-        let record = |seed: &str| {
-            let log = folder.path().join(format!("{seed}.csv"));
-            let given = ["--plant", text(&plant), "--seed", seed, "--out", text(&log)];
-            succeeds(&[&["simulate"], &given[..]].concat());
-            text(&log).to_owned()
-        };
-        let [a, b, c, test] = ["1", "2", "3", "4"].map(record);
-        let out = folder.path().join("report");
-        let given = [
-            "--model", "pendulum", "--train", &a, &b, &c, "--test", &test,
-        ];
-        let json = succeeds(&[&["closeloop", "--json", "--out", text(&out)], &given[..]].concat());
-        let report: Value = serde_json::from_str(&json).unwrap();
+        let scratch = Scratch::new();
+        scratch.file("rig.toml", rig.plant());
+        scratch.simulates("rig.toml", &[1, 2, 3, 4]);
+        let logs = "--train run1.csv run2.csv run3.csv --test run4.csv";
+        let report = scratch.json(&format!("closeloop --model pendulum {logs} --out report"));
         let effects = report["effects"].as_array().unwrap();
         let mut found: Vec<(&str, f64)> = (effects.iter())
             .map(|effect| {

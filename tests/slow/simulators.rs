@@ -12,6 +12,7 @@ use serde_json::json;
 use crate::support::catalogue::{assert_near, points, rng};
 use crate::support::mechanisms::{fixture, read, read_to};
 use crate::support::predictions::{client_agrees, predictions};
+use crate::support::tables::rows;
 use crate::support::{exported_models, refuses, residyn, text};
 
 /// An effect as in a model file.
@@ -43,49 +44,62 @@ fn chain() -> ExportModel {
     ExportModel::of_system(&system, Integrator::RK4, 0.002, json!({}))
 }
 
-/// Models that both formats carry.
-fn plain() -> Vec<(&'static str, ExportModel)> {
-    let fine = Integrator::fine(4.try_into().unwrap());
-    let friction = |joint| {
-        let dry = effect("coulomb_friction", joint, "F_c = 0.1");
-        dry + &effect("viscous_friction", joint, "b = 0.05")
+/// Models that both formats carry: name, system, integrator, and effects with their joints and values.
+const PLAIN: &str = "
+pendulum              | pendulum | euler |
+pendulum with effects | pendulum | rk4   | FRICTION@1; actuator_saturation@1: m = 2.0; gravity_tilt@1: delta = 0.3
+drive                 | drive    | rk4   | FRICTION@1
+acrobot               | acrobot  | fine  |
+acrobot with effects  | acrobot  | rk4   | FRICTION@2; actuator_saturation@2: m = 5.0; gravity_tilt@1: delta = 0.3
+cartpole              | cartpole | fine  |
+cartpole with effects | cartpole | euler | FRICTION@1; FRICTION@2; actuator_saturation@1: m = 4.0
+";
+
+/// Models that only MJCF carries, compared step by step.
+const DRIVEN: &str = "
+servo with a gain | servo    | rk4 | actuator_gain@1: g = 0.3; SPRING@1
+gain, then limit  | pendulum | rk4 | actuator_gain@1: g = 0.3; actuator_saturation@1: m = 3.0; SPRING@1
+limit, then gain  | acrobot  | rk4 | actuator_saturation@2: m = 3.0; actuator_gain@2: g = 0.3; ROTOR@1; ROTOR@2
+gain and offset   | cartpole | rk4 | constant_torque@1: tau_0 = -0.4; actuator_gain@1: g = 0.3; ROTOR@1; ROTOR@2; SPRING@2
+";
+
+/// The effects of a table's cell, as in a model file.
+fn effects(cell: &str) -> Vec<String> {
+    let parts = cell.split("; ").filter(|part| !part.is_empty());
+    let part = |part: &str| {
+        let (name, rest) = part.split_once('@').unwrap();
+        let (joint, values) = rest.split_once(": ").unwrap_or((rest, ""));
+        let joint = joint.parse().unwrap();
+        match name {
+            "FRICTION" => {
+                let dry = effect("coulomb_friction", joint, "F_c = 0.1");
+                dry + &effect("viscous_friction", joint, "b = 0.05")
+            }
+            "SPRING" => effect("joint_spring", joint, "k = 1.5\nq_0 = 0.2"),
+            "ROTOR" => effect("rotor_inertia", joint, "J = 0.2"),
+            name => effect(name, joint, values),
+        }
     };
-    let limited = |joint, m: f64| effect("actuator_saturation", joint, &format!("m = {m}"));
-    let tilted = effect("gravity_tilt", 1, "delta = 0.3");
-    vec![
-        (
-            "pendulum",
-            portable("pendulum", Integrator::SEMI_IMPLICIT_EULER, &[]),
-        ),
-        (
-            "pendulum with effects",
-            portable(
-                "pendulum",
-                Integrator::RK4,
-                &[friction(1), limited(1, 2.0), tilted.clone()],
-            ),
-        ),
-        ("drive", portable("drive", Integrator::RK4, &[friction(1)])),
-        ("chain of five", chain()),
-        ("acrobot", portable("acrobot", fine, &[])),
-        (
-            "acrobot with effects",
-            portable(
-                "acrobot",
-                Integrator::RK4,
-                &[friction(2), limited(2, 5.0), tilted],
-            ),
-        ),
-        ("cartpole", portable("cartpole", fine, &[])),
-        (
-            "cartpole with effects",
-            portable(
-                "cartpole",
-                Integrator::SEMI_IMPLICIT_EULER,
-                &[friction(1), friction(2), limited(1, 4.0)],
-            ),
-        ),
-    ]
+    parts.map(part).collect()
+}
+
+fn models(table: &str) -> Vec<(String, ExportModel)> {
+    let model = |[name, system, integrator, cell]: [String; 4]| {
+        let integrator = match integrator.as_str() {
+            "euler" => Integrator::SEMI_IMPLICIT_EULER,
+            "rk4" => Integrator::RK4,
+            _ => Integrator::fine(4.try_into().unwrap()),
+        };
+        (name, portable(&system, integrator, &effects(&cell)))
+    };
+    rows(table).into_iter().map(model).collect()
+}
+
+/// Models that both formats carry.
+fn plain() -> Vec<(String, ExportModel)> {
+    let mut all = models(PLAIN);
+    all.push(("chain of five".to_owned(), chain()));
+    all
 }
 
 /// Equations only, from which the mechanism has to be recovered.
@@ -125,49 +139,10 @@ fn stated() -> Vec<(&'static str, ExportModel)> {
     ]
 }
 
-/// Models that only MJCF carries, compared step by step.
-fn driven() -> Vec<(&'static str, ExportModel)> {
-    let spring = |joint| effect("joint_spring", joint, "k = 1.5\nq_0 = 0.2");
-    let rotor = |joint| effect("rotor_inertia", joint, "J = 0.2");
-    let gain = |joint| effect("actuator_gain", joint, "g = 0.3");
-    let limited = |joint| effect("actuator_saturation", joint, "m = 3.0");
-    let constant = |joint| effect("constant_torque", joint, "tau_0 = -0.4");
-    vec![
-        (
-            "servo with a gain",
-            portable("servo", Integrator::RK4, &[gain(1), spring(1)]),
-        ),
-        (
-            "gain, then limit",
-            portable(
-                "pendulum",
-                Integrator::RK4,
-                &[gain(1), limited(1), spring(1)],
-            ),
-        ),
-        (
-            "limit, then gain",
-            portable(
-                "acrobot",
-                Integrator::RK4,
-                &[limited(2), gain(2), rotor(1), rotor(2)],
-            ),
-        ),
-        (
-            "gain and offset",
-            portable(
-                "cartpole",
-                Integrator::RK4,
-                &[constant(1), gain(1), rotor(1), rotor(2), spring(2)],
-            ),
-        ),
-    ]
-}
-
 #[test]
 fn mujoco_integrates_written_mjcf_to_the_same_states() {
     client_agrees(find("mjcf").unwrap(), &plain());
-    client_agrees(find("mjcf").unwrap(), &driven());
+    client_agrees(find("mjcf").unwrap(), &models(DRIVEN));
     client_agrees(find("mjcf").unwrap(), &stated());
 }
 
@@ -218,7 +193,7 @@ fn written_mechanisms_read_back_with_the_same_accelerations() {
             let own = own.iter().find(|p| p.unit == "m/s^2");
             chain.gravity = own.map_or(chain.gravity, |g| down * g.value);
             let text = model_text(&chain);
-            let back = Model::from_text(Path::new(name), &text, library.effects()).unwrap();
+            let back = Model::from_text(Path::new(&name), &text, library.effects()).unwrap();
             let n = model.joints();
             let back = back.dynamics();
             for point in points(&back, 50, 1) {

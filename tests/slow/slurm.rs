@@ -12,7 +12,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use crate::support::in_folder::json;
-use crate::support::paths::config;
+use crate::support::paths::{config, ours};
 use crate::support::run_folders::ended_alike;
 use crate::support::text;
 
@@ -278,7 +278,7 @@ fn an_array_job_whose_tasks_and_daemons_are_killed_ends_with_the_bytes_of_one_ma
         slurm.path("merged.parts"),
     );
     let command = ["experiment", "physics-prior", "--config", text(&config)];
-    let submit = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/slurm/submit");
+    let submit = ours("scripts/slurm/submit");
     let shards = SHARDS.to_string();
     let array = [&[shards.as_str(), text(&out)], &command[..]].concat();
     let mut submit = slurm.client(submit, &array);

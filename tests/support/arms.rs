@@ -1,25 +1,30 @@
 //! Models of arms, and logs of their motion.
 
 use std::f64::consts::TAU;
-use std::path::Path;
 
 use rand::RngExt;
 use residyn_core::data::Log;
-use residyn_core::model::chain::{Chain, model_text};
-use residyn_core::model::{Library, Model};
+use residyn_core::model::Model;
+use residyn_core::model::chain::Chain;
 
 use super::catalogue::rng;
+use super::mechanisms::system;
 
-/// As `residyn new` writes it.
-pub fn described(chain: &Chain) -> Model {
-    let library = Library::built_in();
-    let path = Path::new(&chain.name);
-    Model::from_text(path, &model_text(chain), library.effects()).unwrap()
+/// The model of a chain, its bodies only, without the effects on the joints.
+pub fn model(chain: &Chain) -> Model {
+    system(chain).with_effects(Vec::new())
 }
 
-/// Its bodies only, without the effects on the joints.
-pub fn model(chain: &Chain) -> Model {
-    described(chain).with_effects(Vec::new())
+/// The model with every body off by 10 to 25 %, the same in shape: still physical.
+pub fn as_built(model: &Model) -> Model {
+    let mut built = model.clone();
+    for (k, body) in model.inertias().into_iter().enumerate() {
+        let factor = [1.2, 0.85, 1.15, 0.9, 1.25][k];
+        for parameter in body {
+            built.parameters[parameter].value *= factor;
+        }
+    }
+    built
 }
 
 /// A log of sines of several frequencies in each joint, with the torques that a model needs for them.

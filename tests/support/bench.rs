@@ -1,16 +1,15 @@
 //! A small bench of rigs on simulated logs.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use residyn::read_model;
 use residyn_core::model::Library;
 use residyn_io::write_log;
 use residyn_validation::{Cell, Source, read as grid};
-use tempfile::TempDir;
 
+use super::Scratch;
 use super::paths::ours;
-use super::text;
 
 /// Four logs of a pendulum with dry friction.
 fn record(folder: &Path) {
@@ -42,37 +41,13 @@ published = [{ name = "1.0", model = "pendulum", parameters = { C_g = -19.62, C_
 also = { fourth = ["log4.csv"] }
 "#;
 
-/// A folder with a file of rigs and the logs.
-pub struct Bench {
-    pub folder: TempDir,
-}
+/// The command in a folder of [`bench`].
+pub const COMMAND: &str = "bench rigs --rigs rigs.toml --data . --out out";
 
-impl Bench {
-    pub fn new(rigs: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        record(&folder.path().join("logs"));
-        fs::write(folder.path().join("rigs.toml"), rigs).unwrap();
-        Self { folder }
-    }
-
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    /// Run the command with these additional flags.
-    pub fn command(&self, more: &[&str], run: impl Fn(&[&str])) {
-        let [rigs, out] = ["rigs.toml", "out"].map(|name| self.path(name));
-        let data = text(self.folder.path());
-        let rigs = [
-            "bench",
-            "rigs",
-            "--rigs",
-            text(&rigs),
-            "--data",
-            data,
-            "--out",
-            text(&out),
-        ];
-        run(&[rigs.as_slice(), more].concat());
-    }
+/// A folder with a file of rigs, `rigs.toml`, and the logs.
+pub fn bench(rigs: &str) -> Scratch {
+    let scratch = Scratch::new();
+    record(&scratch.path("logs"));
+    scratch.file("rigs.toml", rigs);
+    scratch
 }

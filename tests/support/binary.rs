@@ -16,42 +16,66 @@ pub fn residyn(arguments: &[&str]) -> Output {
 /// Run the program in this many kB of virtual memory.
 #[cfg(unix)]
 pub fn residyn_within(memory_kb: u64, arguments: &[&str]) -> Output {
-    // The threads' own shares of virtual memory depend on the machine.
-    Command::new("bash")
+    within(memory_kb).args(arguments).output().unwrap()
+}
+
+/// The program in this many kB of virtual memory.
+#[cfg(unix)]
+pub fn within(memory_kb: u64) -> Command {
+    let mut command = Command::new("bash");
+    command
         .args(["-c", "ulimit -v \"$0\"; exec \"$@\""])
         .arg(memory_kb.to_string())
         .arg(env!("CARGO_BIN_EXE_residyn"))
-        .args(arguments)
-        .env("MALLOC_ARENA_MAX", "1")
-        .env("RAYON_NUM_THREADS", "2")
-        .output()
-        .expect("the binary runs")
+        // The threads' own shares of virtual memory depend on the machine.
+        .envs([("MALLOC_ARENA_MAX", "1"), ("RAYON_NUM_THREADS", "2")]);
+    command
 }
 
 /// Run the program, which must succeed, and return its standard output.
+#[track_caller]
 pub fn succeeds(arguments: &[&str]) -> String {
-    let output = residyn(arguments);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?} failed:\n{errors}");
-    String::from_utf8(output.stdout).expect("output is UTF-8")
+    printed(&residyn(arguments), &[0], arguments)
 }
 
 /// Run the program, which must end with an answer, yes or no, and return its standard output.
+#[track_caller]
 pub fn answers(arguments: &[&str]) -> String {
-    let output = residyn(arguments);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    let status = output.status.code();
-    assert!(matches!(status, Some(0 | 1)), "{arguments:?}:\n{errors}");
-    String::from_utf8(output.stdout).expect("output is UTF-8")
+    printed(&residyn(arguments), &[0, 1], arguments)
 }
 
 /// Run the program, which must fail with exit status 2, and return its message.
+#[track_caller]
 pub fn refuses(arguments: &[&str]) -> String {
-    let output = residyn(arguments);
+    refusal(&residyn(arguments), arguments)
+}
+
+/// The standard output of a run that must end with one of these exit statuses.
+#[track_caller]
+pub fn printed(output: &Output, statuses: &[i32], arguments: &[&str]) -> String {
+    said(output, statuses, arguments);
+    String::from_utf8(output.stdout.clone()).expect("output is UTF-8")
+}
+
+/// The errors of a run that must end with one of these exit statuses.
+#[track_caller]
+pub fn said(output: &Output, statuses: &[i32], arguments: &[&str]) -> String {
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}:\n{errors}");
-    assert!(output.stdout.is_empty(), "{arguments:?} printed a result");
+    let is_one = |status| statuses.contains(&status);
+    assert!(
+        output.status.code().is_some_and(is_one),
+        "{arguments:?}: {}\n{errors}",
+        output.status
+    );
     errors
+}
+
+/// The message of a run that must be refused.
+#[track_caller]
+pub fn refusal(output: &Output, arguments: &[&str]) -> String {
+    let message = said(output, &[2], arguments);
+    assert!(output.stdout.is_empty(), "{arguments:?} printed a result");
+    message
 }
 
 /// The message must contain each part.
@@ -60,14 +84,6 @@ pub fn says(message: &str, parts: &[&str]) {
     for part in parts {
         assert!(message.contains(part), "{part:?} is missing in:\n{message}");
     }
-}
-
-/// The error 0.5 s ahead of the first joint on a log, as `residyn evaluate` gives it for `--model FILE` or
-/// `--checkpoint DIR`.
-pub fn evaluated(model: &[&str], log: &str) -> f64 {
-    let all = [&["evaluate", "--json", "--test", log], model].concat();
-    let value: serde_json::Value = serde_json::from_str(&succeeds(&all)).unwrap();
-    value["position_rmse"][1][0].as_f64().unwrap()
 }
 
 /// Wait until a run, which must not end earlier, has made a file.
@@ -81,12 +97,4 @@ pub fn until_there(path: &Path, run: &mut Child) {
 /// A path as text.
 pub fn text(path: &Path) -> &str {
     path.to_str().expect("scratch paths are UTF-8")
-}
-
-/// The output of a program that ran without reaching an answer.
-pub fn ends_without(arguments: &[&str]) -> String {
-    let output = residyn(arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}:\n{message}");
-    message
 }

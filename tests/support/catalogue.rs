@@ -33,6 +33,11 @@ pub fn fitted(effect: &Effect, joint: usize, values: &[f64]) -> FittedEffect {
     }
 }
 
+/// A built-in effect on a joint (counted from 0) with these values.
+pub fn effect(name: &str, joint: usize, values: &[f64]) -> FittedEffect {
+    fitted(Library::built_in().effect(name).unwrap(), joint, values)
+}
+
 /// Uses the same form of the sign on every joint.
 pub fn dynamics(system: &Model, effects: &[FittedEffect], sign: SignForm) -> Dynamics {
     let width = match sign {
@@ -159,6 +164,24 @@ pub fn in_f32(program: &Program, points: &[Vec<f64>]) -> Vec<Vec<f64>> {
     found
 }
 
+/// Fails unless the energy `[total, power, d total / d state..]` of a model changes by the power of the torques at each
+/// point, within this share of the terms that cancel.
+#[track_caller]
+pub fn assert_energy_balanced(model: &Dynamics, energy: &Program, points: &[Vec<f64>], share: f64) {
+    for point in points {
+        let (rates, energy) = (model.program.eval(point), energy.eval(point));
+        let (power, slopes) = (energy[1], &energy[2..]);
+        let parts: Vec<f64> = slopes.iter().zip(&rates).map(|(s, r)| s * r).collect();
+        let change: f64 = parts.iter().sum();
+        let size: f64 = parts.iter().map(|part| part.abs()).sum();
+        assert!(
+            (change - power).abs() <= share * size,
+            "{}: {change} or {power} of {size}",
+            model.name
+        );
+    }
+}
+
 /// The k-th entry of every point.
 pub fn column(points: &[Vec<f64>], k: usize) -> Vec<f64> {
     points.iter().map(|point| point[k]).collect()
@@ -172,4 +195,13 @@ pub fn assert_near(found: f64, wanted: f64, share: f64, what: &str) {
         off <= share,
         "{what}: found {found}, wanted {wanted}, off by {off:e}"
     );
+}
+
+/// Fails unless each number is near the wanted one, as in [`assert_near`].
+#[track_caller]
+pub fn assert_all_near(found: &[f64], wanted: &[f64], share: f64, what: &str) {
+    assert_eq!(found.len(), wanted.len(), "{what}");
+    for (found, wanted) in found.iter().zip(wanted) {
+        assert_near(*found, *wanted, share, what);
+    }
 }

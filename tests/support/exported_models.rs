@@ -13,11 +13,9 @@ use residyn_core::model::{
 use residyn_core::sim::{Integrator, SCHEMES};
 use residyn_formats::ExportModel;
 use serde_json::json;
-use tempfile::TempDir;
 
+use super::Scratch;
 use super::catalogue::rng;
-use super::paths::ours;
-use super::{succeeds, text};
 
 /// Friction, and a command that is delayed by a fraction of a step and then lagged.
 const PENDULUM_EFFECTS: &str = r#"
@@ -66,52 +64,35 @@ m = 4.0
 pub fn all() -> Vec<(&'static str, ExportModel)> {
     let fine = Integrator::fine(4.try_into().unwrap());
     let (euler, rk4) = (Integrator::SEMI_IMPLICIT_EULER, Integrator::RK4);
-    let pendulum = || system("pendulum", "");
-    let friction = || system("pendulum", PENDULUM_EFFECTS);
-    let acrobot = || system("acrobot", "");
-    let late = || system("acrobot", ACROBOT_EFFECTS);
+    let [pendulum, acrobot, cartpole, motor] =
+        ["pendulum", "acrobot", "cartpole", "motor"].map(|name| system(name, ""));
+    let friction = system("pendulum", PENDULUM_EFFECTS);
+    let late = system("acrobot", ACROBOT_EFFECTS);
+    let servo = system("servo", PENDULUM_EFFECTS);
     let mut random = rng(7);
     let forces =
         [Angles::Raw, Angles::SinCos].map(|angles| settings(angles, ResidualOn::Accelerations));
     let rates = settings(Angles::SinCos, ResidualOn::Derivative);
     let mut small = |joints, settings: &MlpSettings| network(joints, settings, &mut random);
-    let residuals = [small(1, &rates), small(2, &forces[0]), small(2, &forces[1])];
-    let priors = [small(1, &forces[1]), small(2, &rates)];
+    let [a, b, c] = [small(1, &rates), small(2, &forces[0]), small(2, &forces[1])];
+    let [d, e] = [small(1, &forces[1]), small(2, &rates)];
     let mut models = vec![
-        ("pendulum", physics(&pendulum(), euler, 0.02)),
-        ("pendulum_effects", physics(&friction(), rk4, 0.01)),
-        (
-            "pendulum_hybrid",
-            hybrid(&friction(), &residuals[0], euler, 0.02),
-        ),
-        (
-            "pendulum_data",
-            data_driven(&pendulum(), &priors[0], rk4, 0.02),
-        ),
-        ("acrobot", physics(&acrobot(), fine, 0.02)),
-        ("acrobot_effects", physics(&late(), fine, 0.01)),
-        (
-            "acrobot_hybrid",
-            hybrid(&late(), &residuals[2], euler, 0.01),
-        ),
-        (
-            "acrobot_data",
-            data_driven(&acrobot(), &priors[1], fine, 0.02),
-        ),
-        ("cartpole", physics(&system("cartpole", ""), rk4, 0.02)),
-        (
-            "servo",
-            physics(&system("servo", PENDULUM_EFFECTS), rk4, 0.01),
-        ),
-        ("motor", physics(&system("motor", ""), rk4, 0.01)),
-        (
-            "cartpole_hybrid",
-            hybrid(&system("cartpole", ""), &residuals[1], rk4, 0.02),
-        ),
+        ("pendulum", physics(&pendulum, euler, 0.02)),
+        ("pendulum_effects", physics(&friction, rk4, 0.01)),
+        ("pendulum_hybrid", hybrid(&friction, a, euler, 0.02)),
+        ("pendulum_data", data_driven(&pendulum, d, rk4, 0.02)),
+        ("acrobot", physics(&acrobot, fine, 0.02)),
+        ("acrobot_effects", physics(&late, fine, 0.01)),
+        ("acrobot_hybrid", hybrid(&late, c, euler, 0.01)),
+        ("acrobot_data", data_driven(&acrobot, e, fine, 0.02)),
+        ("cartpole", physics(&cartpole, rk4, 0.02)),
+        ("servo", physics(&servo, rk4, 0.01)),
+        ("motor", physics(&motor, rk4, 0.01)),
+        ("cartpole_hybrid", hybrid(&cartpole, b, rk4, 0.02)),
     ];
     models.extend(SCHEMES.map(|scheme| {
         let integrator = Integrator::of(scheme);
-        (scheme.name, physics(&acrobot(), integrator, 0.02))
+        (scheme.name, physics(&acrobot, integrator, 0.02))
     }));
     models
 }
@@ -133,29 +114,20 @@ fn physics(system: &Model, integrator: Integrator, step_s: f64) -> ExportModel {
         .with_task(exported_task(&system.name))
 }
 
-fn hybrid(
-    system: &Model,
-    residual: &MlpWeights,
-    integrator: Integrator,
-    step_s: f64,
-) -> ExportModel {
-    let mut model = physics(system, integrator, step_s);
-    model.residual = Some(residual.clone());
-    model
+fn hybrid(system: &Model, residual: MlpWeights, integrator: Integrator, step: f64) -> ExportModel {
+    ExportModel {
+        residual: Some(residual),
+        ..physics(system, integrator, step)
+    }
 }
 
-fn data_driven(
-    system: &Model,
-    prior: &MlpWeights,
-    integrator: Integrator,
-    step_s: f64,
-) -> ExportModel {
+fn data_driven(system: &Model, prior: MlpWeights, by: Integrator, step_s: f64) -> ExportModel {
     let numbers = ModelWeights {
         parameters: Vec::new(),
-        prior: Some(prior.clone()),
+        prior: Some(prior),
         residual: None,
     };
-    ExportModel::new(system, numbers, integrator, step_s, origin(system))
+    ExportModel::new(system, numbers, by, step_s, origin(system))
         .with_task(exported_task(&system.name))
 }
 
@@ -188,22 +160,14 @@ fn network(joints: usize, settings: &MlpSettings, random: &mut ChaCha8Rng) -> Ml
 
 /// A model that the program exported as JSON, with its weights in a file next to it.
 pub fn exported() -> &'static Path {
-    static FOLDER: OnceLock<TempDir> = OnceLock::new();
+    static FOLDER: OnceLock<Scratch> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let (from, to) = (ours(CHECKPOINT), folder.path().join("model.json"));
-        succeeds(&[
-            "export",
-            "--checkpoint",
-            text(&from),
-            "--format",
-            "json",
-            "--out",
-            text(&to),
-        ]);
-        folder
+        let scratch = Scratch::new();
+        let given = format!("--checkpoint $REPO/{CHECKPOINT} --format json");
+        scratch.succeeds(&format!("export {given} --out model.json"));
+        scratch
     });
-    folder.path()
+    folder.folder()
 }
 
 /// A checkpoint of a hybrid model.

@@ -1,37 +1,31 @@
 //! The real binary in its own working folder.
 
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
 use serde_json::Value;
 
+use super::binary::{printed, refusal};
 use super::until_there;
 
-pub fn residyn(dir: &Path, arguments: &[&str]) -> Command {
+fn residyn(dir: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_residyn"));
     command.current_dir(dir).args(arguments);
     command
 }
 
-pub fn run(dir: &Path, arguments: &[&str]) -> Output {
-    residyn(dir, arguments).output().unwrap()
-}
-
 /// The JSON of a run that must succeed.
 pub fn json(dir: &Path, arguments: &[&str]) -> Value {
-    let output = run(dir, &[arguments, &["--json"]].concat());
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {errors}");
-    serde_json::from_slice(&output.stdout).unwrap()
+    let all = [arguments, &["--json"]].concat();
+    let output = residyn(dir, &all).output().unwrap();
+    serde_json::from_str(&printed(&output, &[0], arguments)).unwrap()
 }
 
 /// The message of a run that must be refused.
 pub fn refused(dir: &Path, arguments: &[&str]) -> String {
-    let output = run(dir, arguments);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-    String::from_utf8(output.stderr).unwrap()
+    refusal(&residyn(dir, arguments).output().unwrap(), arguments)
 }
 
 /// Start the command, and kill it this long after a file appears.

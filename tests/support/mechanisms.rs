@@ -14,6 +14,17 @@ use super::catalogue::{dynamics, rng};
 use super::clients::client;
 use super::paths::ours;
 
+/// The descriptions among the fixtures, with the last link of the chain.
+pub const FILES: [(&str, Option<&str>); 7] = [
+    ("planar_2r.urdf", None),
+    ("rounded_2r.urdf", None),
+    ("spatial_3r.urdf", None),
+    ("rp.xml", None),
+    ("prr.xml", None),
+    ("geoms.xml", None),
+    ("linkage_4r.urdf", Some("hand")),
+];
+
 pub fn fixture(name: &str) -> PathBuf {
     ours("tests/fixtures/mechanisms").join(name)
 }
@@ -34,6 +45,7 @@ pub fn read(file: &Path) -> Chain {
     read_to(file, None)
 }
 
+/// A model as `residyn new` writes it.
 pub fn system(chain: &Chain) -> Model {
     let library = Library::built_in();
     Model::from_text(

@@ -17,14 +17,14 @@ pub mod mechanisms;
 pub mod oracles;
 pub mod paths;
 pub mod predictions;
+pub mod reports;
 pub mod run_folders;
 mod scratch;
+pub mod tables;
 pub mod tensors;
 
+pub use self::binary::{answers, refuses, residyn, says, succeeds, text, until_there};
 #[cfg(unix)]
-pub use self::binary::residyn_within;
-pub use self::binary::{
-    answers, ends_without, evaluated, refuses, residyn, says, succeeds, text, until_there,
-};
+pub use self::binary::{residyn_within, within};
 pub use self::measured::measured;
-pub use self::scratch::{Scratch, swinging};
+pub use self::scratch::{Scratch, copy_files, replaced, swinging, words};

@@ -57,8 +57,9 @@ pub fn written(format: &Format, name: &str, model: &ExportModel) -> (TempDir, Pa
 }
 
 /// Every model in one format, as the format's client predicts it.
-pub fn client_agrees(format: &Format, models: &[(&str, ExportModel)]) {
+pub fn client_agrees(format: &Format, models: &[(impl AsRef<str>, ExportModel)]) {
     for (name, model) in models {
+        let name = name.as_ref();
         let (_folder, path) = written(format, name, model);
         let (samples, own) = expected(model);
         let name = format!("{name} as {}", format.name);

@@ -39,10 +39,10 @@ fn contents(
 }
 
 /// The files of these names, in a folder that may not be there.
-fn named(folder: Option<&Path>, names: &[&str]) -> Vec<Vec<u8>> {
+fn named(folder: Option<&Path>, names: &str) -> Vec<Vec<u8>> {
     let read = |folder: &Path| {
         names
-            .iter()
+            .split(' ')
             .map(|name| fs::read(folder.join(name)).unwrap())
             .collect()
     };
@@ -79,15 +79,9 @@ pub fn formulas() -> Vec<Vec<u8>> {
 
 /// Model files, including those made from robot descriptions.
 pub fn models() -> Vec<Vec<u8>> {
-    let folders = [
-        "models/acrobot.toml",
-        "models/cartpole.toml",
-        "models/drive.toml",
-        "models/motor.toml",
-        "models/pendulum.toml",
-        "models/servo.toml",
-    ];
-    let written = [folders.map(ours).to_vec(), files(&ours("docs/rigs"))].concat();
+    let built_in = ["acrobot", "cartpole", "drive", "motor", "pendulum", "servo"];
+    let built_in = built_in.map(|name| ours("models").join(name).with_extension("toml"));
+    let written = [built_in.to_vec(), files(&ours("docs/rigs"))].concat();
     let derived = ["urdf", "mjcf"].into_iter().flat_map(|format| {
         let extension = if format == "urdf" { "urdf" } else { "xml" };
         let described = files(&ours("tests/fixtures/mechanisms"))
@@ -141,18 +135,18 @@ pub fn mjcf() -> Vec<Vec<u8>> {
 }
 
 pub fn manifests() -> Vec<Vec<u8>> {
-    named(Some(&ours(CHECKPOINT)), &["checkpoint.json"])
+    named(Some(&ours(CHECKPOINT)), "checkpoint.json")
 }
 
 pub fn weights() -> Vec<Vec<u8>> {
     named(
         Some(&ours(CHECKPOINT)),
-        &["weights.safetensors", "last.safetensors"],
+        "weights.safetensors last.safetensors",
     )
 }
 
 pub fn optimizers() -> Vec<Vec<u8>> {
-    named(Some(&ours(CHECKPOINT)), &["optimizer.bpk"])
+    named(Some(&ours(CHECKPOINT)), "optimizer.bpk")
 }
 
 /// The descriptions of tensors, which precede the numbers.
@@ -165,11 +159,11 @@ pub fn tensors() -> Vec<Vec<u8>> {
 }
 
 pub fn descriptions() -> Vec<Vec<u8>> {
-    named(Some(exported()), &["model.json"])
+    named(Some(exported()), "model.json")
 }
 
 pub fn reports() -> Vec<Vec<u8>> {
-    named(Some(demo()), &["report.json"])
+    named(Some(demo()), "report.json")
 }
 
 pub fn csv() -> Vec<Vec<u8>> {
@@ -182,13 +176,7 @@ pub fn csv() -> Vec<Vec<u8>> {
 pub fn npz() -> Vec<Vec<u8>> {
     named(
         formats(),
-        &[
-            "matrices.npz",
-            "columns.npz",
-            "fortran.npz",
-            "integers.npz",
-            "pickled.npz",
-        ],
+        "matrices.npz columns.npz fortran.npz integers.npz pickled.npz",
     )
 }
 
@@ -224,28 +212,18 @@ pub fn npy() -> Vec<Vec<u8>> {
 }
 
 pub fn mat() -> Vec<Vec<u8>> {
-    named(
-        formats(),
-        &["plain.mat", "packed.mat", "columns.mat", "integers.mat"],
-    )
+    named(formats(), "plain.mat packed.mat columns.mat integers.mat")
 }
 
 pub fn parquet() -> Vec<Vec<u8>> {
     named(
         formats(),
-        &[
-            "none.parquet",
-            "lists.parquet",
-            "snappy.parquet",
-            "gzip.parquet",
-            "zstd.parquet",
-            "lz4.parquet",
-        ],
+        "none.parquet lists.parquet snappy.parquet gzip.parquet zstd.parquet lz4.parquet",
     )
 }
 
 pub fn lerobot() -> Vec<Vec<u8>> {
-    named(formats(), &["single/meta/info.json"])
+    named(formats(), "single/meta/info.json")
 }
 
 /// The file of episodes of that data set.
@@ -258,21 +236,13 @@ pub fn episodes() -> PathBuf {
 pub fn bags() -> Vec<Vec<u8>> {
     named(
         recordings(),
-        &["alone.db3", "messages_packed/messages_packed.db3"],
+        "alone.db3 messages_packed/messages_packed.db3",
     )
 }
 
 pub fn mcap() -> Vec<Vec<u8>> {
     named(
         recordings(),
-        &[
-            "loose.mcap",
-            "plain.mcap",
-            "zstd.mcap",
-            "lz4.mcap",
-            "commands.mcap",
-            "ros_json.mcap",
-            "foxglove.mcap",
-        ],
+        "loose.mcap plain.mcap zstd.mcap lz4.mcap commands.mcap ros_json.mcap foxglove.mcap",
     )
 }

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use rand_chacha::ChaCha8Rng;
 use residyn::read_model;
 use residyn::read_plant;
 use residyn::read_standard_log;
@@ -29,6 +30,7 @@ use serde_json::Value;
 use super::edits::Form;
 use super::{Target, packed, seeds};
 use crate::support::catalogue::fitted;
+use crate::support::copy_files;
 use crate::support::exported_models::{CHECKPOINT, exported};
 use crate::support::paths::ours;
 
@@ -100,35 +102,57 @@ fn recording(path: &Path) -> bool {
     log_of(path, Quantity::Torque).is_ok()
 }
 
-/// Copies the files of a folder.
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
-        fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
-    }
-}
-
 fn checkpoint_beside(path: &Path) -> bool {
     let folder = path.parent().unwrap();
     Checkpoint::open(folder, library(), Backend::NdArray).is_ok()
 }
 
 fn in_checkpoint(folder: &Path, file: &str) -> PathBuf {
-    copy(&ours(CHECKPOINT), folder);
+    copy_files(&ours(CHECKPOINT), folder);
     folder.join(file)
 }
 
-/// Files that stand alone.
-const ALONE: Target = Target {
-    name: "",
-    inputs: 0,
-    form: Form::Text,
-    seeds: Vec::new,
-    pack: packed::as_it_is,
-    place: |folder| folder.join("input.toml"),
-    read: |_| false,
-};
+impl Target {
+    /// Files of text that stand alone.
+    fn alone(
+        name: &'static str,
+        inputs: u64,
+        seeds: fn() -> Vec<Vec<u8>>,
+        read: fn(&Path) -> bool,
+    ) -> Self {
+        Self {
+            name,
+            inputs,
+            form: Form::Text,
+            seeds,
+            pack: packed::as_it_is,
+            place: |folder| folder.join("input.toml"),
+            read,
+        }
+    }
+
+    /// Logs of a format.
+    fn log(name: &'static str, inputs: u64, seeds: fn() -> Vec<Vec<u8>>) -> Self {
+        let target = Self::alone(name, inputs, seeds, log);
+        target.of(Form::Bytes).placed(|folder| folder.join("run"))
+    }
+
+    fn of(self, form: Form) -> Self {
+        Self { form, ..self }
+    }
+
+    fn packed(self, pack: fn(Vec<u8>, &mut ChaCha8Rng) -> Vec<u8>) -> Self {
+        Self { pack, ..self }
+    }
+
+    fn placed(self, place: fn(&Path) -> PathBuf) -> Self {
+        Self { place, ..self }
+    }
+
+    fn read_by(self, read: fn(&Path) -> bool) -> Self {
+        Self { read, ..self }
+    }
+}
 
 #[test]
 fn formula() {
@@ -158,14 +182,7 @@ fn formula() {
         graph.finish(&slopes).eval(&vec![0.3; names.len()]);
         true
     };
-    Target {
-        name: "formula",
-        inputs: 20_000,
-        seeds: seeds::formulas,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("formula", 20_000, seeds::formulas, read).run();
 }
 
 #[test]
@@ -177,14 +194,7 @@ fn model() {
             true
         })
     };
-    Target {
-        name: "model",
-        inputs: 2000,
-        seeds: seeds::models,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("model", 2000, seeds::models, read).run();
 }
 
 #[test]
@@ -203,27 +213,13 @@ fn effect() {
         }
         true
     };
-    Target {
-        name: "effect",
-        inputs: 3000,
-        seeds: seeds::effects,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("effect", 3000, seeds::effects, read).run();
 }
 
 #[test]
 fn recipe() {
     let read = |path: &Path| Recipe::read(path).is_ok();
-    Target {
-        name: "recipe",
-        inputs: 3000,
-        seeds: seeds::recipes,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("recipe", 3000, seeds::recipes, read).run();
 }
 
 #[test]
@@ -237,14 +233,7 @@ fn task() {
         task.draw_start(&mut rng(0));
         true
     };
-    Target {
-        name: "task",
-        inputs: 3000,
-        seeds: seeds::tasks,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("task", 3000, seeds::tasks, read).run();
 }
 
 #[test]
@@ -263,14 +252,7 @@ fn plant() {
         }
         true
     };
-    Target {
-        name: "plant",
-        inputs: 2000,
-        seeds: seeds::plants,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("plant", 2000, seeds::plants, read).run();
 }
 
 #[test]
@@ -278,41 +260,19 @@ fn experiment() {
     let read = |path: &Path| {
         experiment::Config::read(path).is_ok() || undeclared_effect::Experiment::read(path).is_ok()
     };
-    Target {
-        name: "experiment",
-        inputs: 3000,
-        seeds: seeds::experiments,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("experiment", 3000, seeds::experiments, read).run();
 }
 
 #[test]
 fn bench() {
     let read = |path: &Path| bench::read(path).is_ok() || bench::rigs::read(path).is_ok();
-    Target {
-        name: "bench",
-        inputs: 2000,
-        seeds: seeds::benches,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("bench", 2000, seeds::benches, read).run();
 }
 
 /// Robot descriptions in a format.
 fn robot(name: &'static str, inputs: u64, seeds: fn() -> Vec<Vec<u8>>, read: fn(&Path) -> bool) {
     let place = |folder: &Path| folder.join("arm.xml");
-    Target {
-        name,
-        inputs,
-        seeds,
-        place,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone(name, inputs, seeds, read).placed(place).run();
 }
 
 fn robot_is_read(format: &str, path: &Path) -> bool {
@@ -340,30 +300,18 @@ fn mjcf() {
 #[test]
 fn manifest() {
     let place = |folder: &Path| in_checkpoint(folder, "checkpoint.json");
-    Target {
-        name: "manifest",
-        inputs: 2000,
-        seeds: seeds::manifests,
-        place,
-        read: checkpoint_beside,
-        ..ALONE
-    }
-    .run();
+    Target::alone("manifest", 2000, seeds::manifests, checkpoint_beside)
+        .placed(place)
+        .run();
 }
 
 #[test]
 fn weights() {
     let place = |folder: &Path| in_checkpoint(folder, "weights.safetensors");
-    Target {
-        name: "weights",
-        inputs: 2000,
-        form: Form::Bytes,
-        seeds: seeds::weights,
-        place,
-        read: checkpoint_beside,
-        ..ALONE
-    }
-    .run();
+    Target::alone("weights", 2000, seeds::weights, checkpoint_beside)
+        .of(Form::Bytes)
+        .placed(place)
+        .run();
 }
 
 /// An optimiser's state, with the checkpoint's description giving its hash.
@@ -381,38 +329,26 @@ fn optimizer() {
         let device = Backend::NdArray.device();
         checkpoint.training(&declared.dynamics(), &device).is_ok()
     };
-    Target {
-        name: "optimizer",
-        inputs: 2000,
-        form: Form::Bytes,
-        seeds: seeds::optimizers,
-        place,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("optimizer", 2000, seeds::optimizers, read)
+        .of(Form::Bytes)
+        .placed(place)
+        .run();
 }
 
 #[test]
 fn tensors() {
     let place = |folder: &Path| in_checkpoint(folder, "weights.safetensors");
     let pack = packed::tensors;
-    Target {
-        name: "tensors",
-        inputs: 2000,
-        seeds: seeds::tensors,
-        pack,
-        place,
-        read: checkpoint_beside,
-        ..ALONE
-    }
-    .run();
+    Target::alone("tensors", 2000, seeds::tensors, checkpoint_beside)
+        .packed(pack)
+        .placed(place)
+        .run();
 }
 
 #[test]
 fn description() {
     let place = |folder: &Path| {
-        copy(exported(), folder);
+        copy_files(exported(), folder);
         folder.join("model.json")
     };
     let read = |path: &Path| {
@@ -422,15 +358,9 @@ fn description() {
             true
         })
     };
-    Target {
-        name: "description",
-        inputs: 1000,
-        seeds: seeds::descriptions,
-        place,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("description", 1000, seeds::descriptions, read)
+        .placed(place)
+        .run();
 }
 
 #[test]
@@ -444,106 +374,52 @@ fn report() {
             true
         })
     };
-    Target {
-        name: "report",
-        inputs: 300,
-        seeds: seeds::reports,
-        place,
-        read,
-        ..ALONE
-    }
-    .run();
+    Target::alone("report", 300, seeds::reports, read)
+        .placed(place)
+        .run();
 }
-
-/// Logs of a format.
-const LOG: Target = Target {
-    form: Form::Bytes,
-    place: |folder| folder.join("run"),
-    read: log,
-    ..ALONE
-};
 
 #[test]
 fn csv() {
-    Target {
-        name: "csv",
-        inputs: 2000,
-        form: Form::Text,
-        seeds: seeds::csv,
-        ..LOG
-    }
-    .run();
+    Target::log("csv", 2000, seeds::csv).of(Form::Text).run();
 }
 
 #[test]
 fn gzip() {
-    Target {
-        name: "gzip",
-        inputs: 1000,
-        form: Form::Text,
-        seeds: seeds::csv,
-        pack: packed::gzip,
-        ..LOG
-    }
-    .run();
+    Target::log("gzip", 1000, seeds::csv)
+        .of(Form::Text)
+        .packed(packed::gzip)
+        .run();
 }
 
 #[test]
 fn npz() {
-    Target {
-        name: "npz",
-        inputs: 2000,
-        seeds: seeds::npz,
-        ..LOG
-    }
-    .run();
+    Target::log("npz", 2000, seeds::npz).run();
 }
 
 #[test]
 fn npy() {
-    Target {
-        name: "npy",
-        inputs: 2000,
-        form: Form::Text,
-        seeds: seeds::npy,
-        pack: packed::npz,
-        ..LOG
-    }
-    .run();
+    Target::log("npy", 2000, seeds::npy)
+        .of(Form::Text)
+        .packed(packed::npz)
+        .run();
 }
 
 #[test]
 fn mat() {
-    Target {
-        name: "mat",
-        inputs: 2000,
-        seeds: seeds::mat,
-        ..LOG
-    }
-    .run();
+    Target::log("mat", 2000, seeds::mat).run();
 }
 
 #[test]
 fn packed_mat() {
-    Target {
-        name: "packed_mat",
-        inputs: 2000,
-        seeds: seeds::mat,
-        pack: packed::mat,
-        ..LOG
-    }
-    .run();
+    Target::log("packed_mat", 2000, seeds::mat)
+        .packed(packed::mat)
+        .run();
 }
 
 #[test]
 fn parquet() {
-    Target {
-        name: "parquet",
-        inputs: 2000,
-        seeds: seeds::parquet,
-        ..LOG
-    }
-    .run();
+    Target::log("parquet", 2000, seeds::parquet).run();
 }
 
 #[test]
@@ -556,41 +432,26 @@ fn lerobot() {
         folder.join("meta/info.json")
     };
     let read = |path: &Path| log_of(path.ancestors().nth(2).unwrap(), Quantity::Command).is_ok();
-    Target {
-        name: "lerobot",
-        inputs: 1000,
-        form: Form::Text,
-        seeds: seeds::lerobot,
-        place,
-        read,
-        ..LOG
-    }
-    .run();
+    Target::log("lerobot", 1000, seeds::lerobot)
+        .read_by(read)
+        .of(Form::Text)
+        .placed(place)
+        .run();
 }
 
 #[test]
 fn bag() {
     let place = |folder: &Path| folder.join("run.db3");
-    Target {
-        name: "bag",
-        inputs: 1000,
-        seeds: seeds::bags,
-        place,
-        read: recording,
-        ..LOG
-    }
-    .run();
+    Target::log("bag", 1000, seeds::bags)
+        .read_by(recording)
+        .placed(place)
+        .run();
 }
 
 #[test]
 fn mcap() {
-    Target {
-        name: "mcap",
-        inputs: 2000,
-        seeds: seeds::mcap,
-        pack: packed::mcap,
-        read: recording,
-        ..LOG
-    }
-    .run();
+    Target::log("mcap", 2000, seeds::mcap)
+        .read_by(recording)
+        .packed(packed::mcap)
+        .run();
 }

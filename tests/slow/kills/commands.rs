@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::support::in_folder::json;
 use crate::support::paths::config;
+use crate::support::{replaced, words};
 
 /// A command that works in the folder `out`.
 pub struct Long {
@@ -18,95 +19,76 @@ pub struct Long {
     pub goes_on: fn(&Path) -> Option<String>,
 }
 
-fn long(name: &'static str, arguments: &[&str]) -> Long {
-    let all = arguments.iter().chain(&["--out", "out"]);
+fn long(name: &'static str, line: &str) -> Long {
     Long {
         name,
-        arguments: all.map(|word| (*word).to_owned()).collect(),
+        arguments: words(line).chain(words("--out out")).collect(),
         prepare: |_| (),
         goes_on: |_| None,
     }
 }
 
+/// Run a command that makes input, in this folder.
+fn run(folder: &Path, line: &str) {
+    let line: Vec<String> = words(line).collect();
+    let line: Vec<&str> = line.iter().map(String::as_str).collect();
+    json(folder, &line);
+}
+
+const RECIPE: &str = "--config $REPO/configs/smoke/train-pendulum.toml";
+const EXPERIMENT: &str = "--config $REPO/configs/smoke/physics-prior-pendulum.toml";
+
 pub fn train() -> Long {
-    let recipe = config("smoke/train-pendulum.toml");
     Long {
         goes_on: epoch,
-        ..long(
-            "train",
-            &["train", "--config", &recipe, "--save-every", "20"],
-        )
+        ..long("train", &format!("train {RECIPE} --save-every 20"))
     }
 }
 
 pub fn tune() -> Long {
-    let recipe = config("smoke/tune-pendulum.toml");
-    let arguments = [
-        "tune",
-        "--checkpoint",
-        "prior",
-        "--config",
-        &recipe,
-        "--save-every",
-        "20",
-    ];
+    let recipe = "--config $REPO/configs/smoke/tune-pendulum.toml";
+    let line = format!("tune --checkpoint prior {recipe} --save-every 20");
     Long {
-        prepare: |folder| {
-            let recipe = config("smoke/train-pendulum.toml");
-            json(folder, &["train", "--config", &recipe, "--out", "prior"]);
-        },
+        prepare: |folder| run(folder, &format!("train {RECIPE} --out prior")),
         goes_on: epoch,
-        ..long("tune", &arguments)
+        ..long("tune", &line)
     }
 }
 
 pub fn sweep() -> Long {
-    let recipe = config("smoke/train-pendulum.toml");
-    long("sweep", &["sweep", "--config", &recipe, "--seeds", "4"])
+    long("sweep", &format!("sweep {RECIPE} --seeds 4"))
 }
 
 pub fn mbrl() -> Long {
-    let experiment = config("smoke/physics-prior-pendulum.toml");
-    long("mbrl", &["mbrl", "--config", &experiment])
+    long("mbrl", &format!("mbrl {EXPERIMENT}"))
 }
 
 pub fn experiment() -> Long {
-    let experiment = config("smoke/physics-prior-pendulum.toml");
-    let arguments = ["experiment", "physics-prior", "--config", &experiment];
-    long("experiment", &arguments)
+    long(
+        "experiment",
+        &format!("experiment physics-prior {EXPERIMENT}"),
+    )
 }
 
 pub fn bench() -> Long {
     Long {
         prepare: |folder| {
             let grid = fs::read_to_string(config("bench/smoke.toml")).unwrap();
-            let short = grid.replace("logs = 3\nseconds = 8", "logs = 2\nseconds = 3");
-            assert_ne!(short, grid);
-            fs::write(folder.join("grid.toml"), short).unwrap();
+            let (usual, short) = ("logs = 3\nseconds = 8", "logs = 2\nseconds = 3");
+            fs::write(folder.join("grid.toml"), replaced(&grid, usual, short)).unwrap();
         },
-        ..long("bench", &["bench", "effects", "--grid", "grid.toml"])
+        ..long("bench", "bench effects --grid grid.toml")
     }
 }
 
 pub fn closeloop() -> Long {
-    let arguments = [
-        "closeloop",
-        "--model",
-        "pendulum",
-        "--train",
-        "run1.csv",
-        "--test",
-        "run2.csv",
-        "--calibrate",
-        "2",
-    ];
+    let line = "closeloop --model pendulum --train run1.csv --test run2.csv --calibrate 2";
     Long {
         prepare: |folder| {
-            for (log, seed) in [("run1.csv", "1"), ("run2.csv", "2")] {
-                let simulate = ["simulate", "--plant", "pendulum", "--duration", "5"];
-                let friction = ["--effect", "coulomb_friction=0.3"];
-                let own = ["--seed", seed, "--out", log];
-                json(folder, &[&simulate[..], &friction, &own].concat());
+            for seed in [1, 2] {
+                let plant = "--plant pendulum --duration 5 --effect coulomb_friction=0.3";
+                let own = format!("--seed {seed} --out run{seed}.csv");
+                run(folder, &format!("simulate {plant} {own}"));
             }
         },
         goes_on: |root| {
@@ -114,7 +96,7 @@ pub fn closeloop() -> Long {
             let whole = kept.matches('\n').count();
             (whole > 0).then(|| format!("note: out has {whole} of "))
         },
-        ..long("closeloop", &arguments)
+        ..long("closeloop", line)
     }
 }
 

@@ -7,6 +7,8 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
+use crate::support::paths::ours;
+
 /// A disturbance of a run.
 #[derive(Debug, Clone, Copy)]
 pub enum Fault {
@@ -43,11 +45,14 @@ pub struct Layer(PathBuf);
 impl Layer {
     /// Compiled into a folder.
     pub fn in_folder(folder: &Path) -> Self {
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/clients/faults.c");
         let library = folder.join("faults.so");
         let mut compiler = Command::new("cc");
         compiler.args(["-O1", "-shared", "-fPIC", "-o"]);
-        let compiled = compiler.arg(&library).arg(source).arg("-ldl").status();
+        let compiled = compiler
+            .arg(&library)
+            .arg(ours("tests/clients/faults.c"))
+            .arg("-ldl")
+            .status();
         assert!(compiled.unwrap().success());
         Self(library)
     }

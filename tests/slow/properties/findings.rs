@@ -23,14 +23,11 @@ pub struct Rig {
     logs: Vec<Log>,
 }
 
-const PENDULUM: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/models/pendulum.toml"));
-const ACROBOT: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/models/acrobot.toml"));
+const PENDULUM: &str = include_str!("../../../models/pendulum.toml");
+const ACROBOT: &str = include_str!("../../../models/acrobot.toml");
 
 /// The acrobot with its joints numbered the other way round.
-const RENUMBERED: &str = include_str!(concat!(
-    env!("CARGO_MANIFEST_DIR"),
-    "/tests/fixtures/acrobot-renumbered.toml"
-));
+const RENUMBERED: &str = include_str!("../../fixtures/acrobot-renumbered.toml");
 
 /// Rigs of one and of two joints, recorded in seconds; sizes of effects are drawn at random.
 const ONE: &str = "model = \"pendulum\"\nparameters = { C_g = -17.4, C_i = 4.6 }\n\
@@ -415,12 +412,9 @@ fn check(rig: &Rig) {
         "other units",
     );
     let later = |seconds: f64| {
-        let shift = move |name: &str, value| {
-            if name == "time" {
-                value + seconds
-            } else {
-                value
-            }
+        let shift = |name: &str, value| match name {
+            "time" => value + seconds,
+            _ => value,
         };
         usual().with(shift).findings(IN_ORDER)
     };
