@@ -109,28 +109,34 @@ fn mppi_finds_the_best_sequence_within_its_standard_deviation() {
 
 #[test]
 fn inputs_stay_within_their_bounds() {
+    let plan = |settings| near(&settings, &[[-3.0, 3.0], [-0.5, 0.1]], 2).plan(1.0);
     for settings in all() {
-        let plan = near(&settings, &[[-3.0, 3.0], [-0.5, 0.1]], 2).plan(1.0);
-        for step in plan.inputs {
+        for step in plan(settings).inputs {
             let kept =
                 (-3.0..=3.0).contains(&step[0]) && (-0.5..=0.1f32).contains(&(step[1] as f32));
-            let scatters = matches!(settings.method, Method::Mppi(_));
+            assert!(kept, "{settings:?} {step:?}");
+        }
+    }
+    for settings in [CEM, icem()].map(with) {
+        for step in plan(settings).inputs {
             let reached = (step[0] - 1.0).abs() < 0.1 && step[1] > 0.08;
-            assert!(kept && (reached || scatters), "{settings:?} {step:?}");
+            assert!(reached, "{settings:?} {step:?}");
         }
     }
 }
 
 #[test]
 fn diverging_candidates_rank_last() {
+    // The best known sequences border on those with unknown returns.
+    let plan = |settings| near(&settings, &[[-3.0, 3.0]], 3).plan(2.5);
+    let inputs = |plan: &Plan| plan.inputs.concat().into_iter();
+    for settings in [CEM, icem(), narrow_mppi()].map(with) {
+        let plan = plan(settings);
+        assert!(inputs(&plan).all(|x| x >= 1.5), "{settings:?} {plan:?}");
+    }
     for settings in all() {
-        // The best known sequences border on those with unknown returns.
-        let plan = near(&settings, &[[-3.0, 3.0]], 3).plan(2.5);
-        let inputs = || plan.inputs.iter().flatten();
-        assert!(
-            inputs().all(|x| (1.5..2.0).contains(x)),
-            "{settings:?} {plan:?}"
-        );
+        let plan = plan(settings);
+        assert!(inputs(&plan).all(|x| x < 2.0), "{settings:?} {plan:?}");
         assert!(plan.diverged > 0, "{settings:?} {plan:?}");
         let lost = near(&settings, &[[2.5, 3.0]], 3).plan(2.5);
         assert_eq!(lost.best, f64::NEG_INFINITY);
