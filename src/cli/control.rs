@@ -46,7 +46,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "STEPS")]
     replan: Option<usize>,
     /// Planner, instead of the task's; with that planner's default settings
-    #[arg(long, value_name = "METHOD", value_parser = Method::NAMES)]
+    #[arg(long, value_name = "METHOD", value_parser = Method::names())]
     method: Option<String>,
     /// Positions, then velocities at the start, instead of the task's
     #[arg(long, num_args = 1.., value_name = "NUMBER", allow_negative_numbers = true)]

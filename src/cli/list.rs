@@ -10,7 +10,7 @@ use residyn_control::control::Task;
 use residyn_core::model::{Effect, EffectParameter, Library, Model, ReadyDrive};
 use residyn_core::plant::Plant;
 use residyn_formats::FORMATS;
-use residyn_io::read_plant;
+use residyn_io::{LOG_FORMATS, read_plant};
 
 /// List systems, effects, drives, plants, tasks or formats
 #[derive(Debug, Args)]
@@ -33,23 +33,8 @@ enum What {
     Formats,
 }
 
-/// Formats of the program's own files and of logs.
+/// Formats of the program's own files.
 const OTHERS: &[(&str, &str)] = &[
-    (
-        "csv",
-        "logs, out; in with any separator, decimal commas, and packed with gzip",
-    ),
-    ("npz", "logs of NumPy, in"),
-    ("mat", "logs of MATLAB, versions 5 to 7, in"),
-    (
-        "mcap",
-        "recordings of robots, joint states in CDR or JSON, in",
-    ),
-    (
-        "rosbag2",
-        "recordings of ROS 2 as .db3 files and folders, in",
-    ),
-    ("parquet", "logs, and data sets of LeRobot, in"),
     (
         "toml",
         "models, effects, plants, tasks and recipes, in; fitted models, out",
@@ -163,10 +148,9 @@ fn formats() -> Vec<Entry> {
         let read = read.map_or_else(String::new, |robots| format!("; {}, in", robots.about));
         (format.name, format!("{}, out{read}", format.about))
     });
-    let others = OTHERS
-        .iter()
-        .map(|(name, what)| (*name, (*what).to_owned()));
-    let all = models.chain(others);
+    let logs = LOG_FORMATS.iter().map(|log| (log.name, log.about));
+    let others = logs.chain(OTHERS.iter().copied());
+    let all = models.chain(others.map(|(name, about)| (name, about.to_owned())));
     all.map(|(name, about)| {
         (
             format!("{name}: {about}\n"),

@@ -17,7 +17,7 @@ mod grid;
 mod hidden;
 mod identifiable;
 mod judge;
-mod laws;
+pub mod laws;
 mod machine;
 mod mechanics;
 mod motion;

@@ -16,3 +16,4 @@ pub use log_file::{
 };
 pub use model_file::{effect_files, read_effect, read_model, with_effects_in};
 pub use plant_file::{plant_from_text, read_plant};
+pub use table::{LOG_FORMATS, LogFormat};

@@ -61,7 +61,9 @@ pub enum TrainError {
     #[error("setting `{name}` is {value}; it must be finite and not negative")]
     Setting { name: &'static str, value: f64 },
     #[error(
-        "setting `weight_decay` is above 0, and {0:?} has no decoupled weight decay; use adam, adan, lamb or lion"
+        "setting `weight_decay` is above 0, and {name} has no decoupled weight decay; use one of {others}",
+        name = .0.name(),
+        others = OptimizerKind::that_decay()
     )]
     Decay(OptimizerKind),
     #[error(

@@ -48,51 +48,89 @@ pub enum Schedule {
     Linear,
 }
 
+/// Gives weights of an optimiser's group weight decay, by this share of the learning rate.
+type Decay = fn(ModuleOptimizer, ParamGroup, f32) -> ModuleOptimizer;
+
 impl OptimizerKind {
+    /// Every optimiser.
+    pub const ALL: [Self; 7] = [
+        Self::Adam,
+        Self::AdaGrad,
+        Self::Adan,
+        Self::Lamb,
+        Self::Lion,
+        Self::RmsProp,
+        Self::Sgd,
+    ];
+
+    /// The optimiser without weight decay and, if it has a decoupled one, what adds it.
+    fn with_decay(self) -> (ModuleOptimizer, Option<Decay>) {
+        match self {
+            Self::Adam => (
+                adam().into(),
+                Some(|plain, group, decay| plain.with_group(group, adam_w(decay), None)),
+            ),
+            Self::AdaGrad => (AdaGradConfig::new().init(), None),
+            Self::Adan => (
+                AdanConfig::new().init(),
+                Some(|plain, group, decay| {
+                    let adan = AdanConfig::new().with_weight_decay(decay).build();
+                    plain.with_group(group, adan, None)
+                }),
+            ),
+            Self::Lamb => (
+                LambConfig::new().init(),
+                Some(|plain, group, decay| {
+                    let lamb = LambConfig::new().with_weight_decay(decay).build();
+                    plain.with_group(group, lamb, None)
+                }),
+            ),
+            Self::Lion => (
+                LionConfig::new().init(),
+                Some(|plain, group, decay| {
+                    let lion = LionConfig::new().with_weight_decay(decay).build();
+                    plain.with_group(group, lion, None)
+                }),
+            ),
+            Self::RmsProp => (RmsPropConfig::new().init(), None),
+            Self::Sgd => (SgdConfig::new().init(), None),
+        }
+    }
+
     /// The optimiser without weight decay.
     fn plain(self) -> ModuleOptimizer {
-        match self {
-            Self::Adam => adam().into(),
-            Self::AdaGrad => AdaGradConfig::new().init(),
-            Self::Adan => AdanConfig::new().init(),
-            Self::Lamb => LambConfig::new().init(),
-            Self::Lion => LionConfig::new().init(),
-            Self::RmsProp => RmsPropConfig::new().init(),
-            Self::Sgd => SgdConfig::new().init(),
-        }
+        self.with_decay().0
     }
 
     /// The optimiser, with weights in `group` that decay by this share of the learning rate.
     fn decaying(self, group: ParamGroup, decay: f32) -> Result<ModuleOptimizer, TrainError> {
-        let plain = self.plain();
-        Ok(match self {
-            Self::Adam => {
-                let config = AdamWConfig::new().with_epsilon(EPSILON);
-                let adam_w = config.with_weight_decay(decay).build();
-                plain.with_group(group, WithoutSubnormals(adam_w), None)
-            }
-            Self::Adan => plain.with_group(
-                group,
-                AdanConfig::new().with_weight_decay(decay).build(),
-                None,
-            ),
-            Self::Lamb => plain.with_group(
-                group,
-                LambConfig::new().with_weight_decay(decay).build(),
-                None,
-            ),
-            Self::Lion => plain.with_group(
-                group,
-                LionConfig::new().with_weight_decay(decay).build(),
-                None,
-            ),
-            Self::AdaGrad | Self::RmsProp | Self::Sgd => return Err(TrainError::Decay(self)),
-        })
+        match self.with_decay() {
+            (plain, Some(add)) => Ok(add(plain, group, decay)),
+            (_, None) => Err(TrainError::Decay(self)),
+        }
+    }
+
+    /// The optimisers with decoupled weight decay, as a recipe names them, with commas between.
+    pub(super) fn that_decay() -> String {
+        let decay = |kind: &Self| kind.with_decay().1.is_some();
+        let names = Self::ALL.into_iter().filter(decay).map(Self::name);
+        names.collect::<Vec<_>>().join(", ")
+    }
+
+    /// As a recipe names it.
+    pub(super) fn name(self) -> String {
+        let name = serde_json::to_value(self).expect("a variant is a text");
+        name.as_str().expect("a variant is a text").to_owned()
     }
 }
 
 fn adam() -> WithoutSubnormals<burn::optim::Adam> {
     WithoutSubnormals(AdamConfig::new().with_epsilon(EPSILON).build())
+}
+
+fn adam_w(decay: f32) -> WithoutSubnormals<burn::optim::AdamW> {
+    let config = AdamWConfig::new().with_epsilon(EPSILON);
+    WithoutSubnormals(config.with_weight_decay(decay).build())
 }
 
 impl Schedule {

@@ -46,6 +46,13 @@ pub enum Method {
     Mppi(Mppi),
 }
 
+/// Every method: its name, and the method with its usual settings for an elite of this size.
+const METHODS: [(&str, fn(usize) -> Method); 3] = [
+    ("cem", |elite| Method::Cem(Cem { elite })),
+    ("icem", |elite| Method::Icem(Icem::new(elite))),
+    ("mppi", |_| Method::Mppi(Mppi::default())),
+];
+
 impl Settings {
     /// Refuse settings with which no search can run.
     ///
@@ -70,18 +77,16 @@ impl Settings {
 
 impl Method {
     /// The names that files and the command line know.
-    pub const NAMES: [&str; 3] = ["cem", "icem", "mppi"];
+    pub fn names() -> [&'static str; METHODS.len()] {
+        METHODS.map(|(name, _)| name)
+    }
 
     /// A method with its usual settings; methods that have an elite take the share published here for the cross-entropy
     /// method, 20 of 300.
     pub fn usual(name: &str, population: usize) -> Option<Self> {
         let elite = (population / 15).max(1);
-        match name {
-            "cem" => Some(Self::Cem(Cem { elite })),
-            "icem" => Some(Self::Icem(Icem::new(elite))),
-            "mppi" => Some(Self::Mppi(Mppi::default())),
-            _ => None,
-        }
+        let method = METHODS.into_iter().find(|(known, _)| *known == name);
+        method.map(|(_, usual)| usual(elite))
     }
 
     pub(super) fn search(self) -> Arc<dyn Search> {

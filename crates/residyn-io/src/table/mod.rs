@@ -5,12 +5,13 @@ mod budget;
 mod csv;
 #[cfg(feature = "parquet")]
 mod ending;
+mod format;
 #[cfg(feature = "parquet")]
 mod lerobot;
 mod mat;
 mod npy;
 mod npz;
-#[cfg(feature = "parquet")]
+#[cfg_attr(not(feature = "parquet"), path = "no_parquet.rs")]
 mod parquet;
 #[cfg_attr(not(feature = "recordings"), path = "no_recording.rs")]
 mod recording;
@@ -19,56 +20,13 @@ mod source;
 use std::io::Read;
 use std::path::Path;
 
-use self::csv::Csv;
 use self::source::Source;
 use residyn_core::data::{Columns, LogError, Table};
 
 use crate::guarded::guarded;
 use residyn_core::limits::LOG_COLUMNS;
 
-/// The first bytes of each format except text.
-const ZIP: &[u8] = b"PK\x03\x04";
-const PARQUET: &[u8] = b"PAR1";
-const SQLITE: &[u8] = b"SQLite format 3\0";
-const MCAP: &[u8] = b"\x89MCAP0\r\n";
-
-/// The formats that are read here and there, from files only.
-const FROM_FILES: [&[u8]; 4] = [ZIP, PARQUET, SQLITE, MCAP];
-
-/// Formats that are recognised but not read: their first bytes, and the line that converts them.
-const FOREIGN: [(&[u8], &str); 7] = [
-    (
-        b"#ROSBAG",
-        "a ROS 1 bag is not read; convert it: `pip install rosbags && rosbags-convert --src run.bag --dst run`, and read the \
-         folder `run`",
-    ),
-    (
-        b"\x28\xb5\x2f\xfd",
-        "is packed with zstd; unpack it: `zstd -d run.db3.zstd`",
-    ),
-    (
-        SQLITE,
-        "a packed recording is not read; unpack it: `gunzip run.db3.gz`",
-    ),
-    (
-        ZIP,
-        "a gzipped .npz is not read; unpack it: `gunzip run.npz.gz`",
-    ),
-    (
-        b"\x89HDF",
-        "HDF5 is not read; convert it: `python -c \"import h5py, numpy; f = h5py.File('run.h5'); numpy.savez('run.npz', **{k: f[k][:] for k in f})\"`",
-    ),
-    (
-        b"MATLAB 7.3",
-        "MATLAB's version 7.3 is HDF5, which is not read; save it with '-v7', or convert it: \
-         `python -c \"import h5py, numpy; f = h5py.File('run.mat'); numpy.savez('run.npz', **{k: f[k][:].T for k in f if k[0] != '#'})\"`",
-    ),
-    (
-        PARQUET,
-        "Parquet is read only unpacked, by a build with the feature `parquet`; use such a build, or convert it: \
-         `python -c \"import pandas; pandas.read_parquet('run.parquet').to_csv('run.csv', index=False)\"`",
-    ),
-];
+pub use format::{LOG_FORMATS, LogFormat};
 
 /// The table that a file or a folder holds, whatever its format: by how it begins, not by its name. If a file holds
 /// several tables, the one that has the columns.
@@ -89,7 +47,7 @@ pub(super) fn open_reader(
     columns: &Columns,
 ) -> Result<Box<dyn Table>, LogError> {
     let source = Source::held(name, reader)?;
-    checked(name, || in_source(name, source, columns))
+    checked(name, || format::read(name, source, columns))
 }
 
 /// A table with columns that are not too many, from a format's reader, which may panic on a damaged file.
@@ -115,37 +73,5 @@ fn in_file(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
     if path.is_dir() {
         return Ok(Box::new(recording::of_folder(path, columns)?));
     }
-    in_source(path, Source::of(path)?, columns)
-}
-
-fn in_source(name: &Path, source: Source, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
-    let begin = source.begin(name)?;
-    // Recordings may be larger than the memory: they are not read at once.
-    if let Some(path) = source.plain_file() {
-        if begin.starts_with(SQLITE) {
-            return Ok(Box::new(recording::of_bag(path, columns)?));
-        }
-        if begin.starts_with(MCAP) {
-            return Ok(Box::new(recording::of_mcap(path, columns)?));
-        }
-        if begin.starts_with(ZIP) {
-            return Ok(Box::new(npz::read(path)?));
-        }
-        #[cfg(feature = "parquet")]
-        if begin.starts_with(PARQUET) {
-            return Ok(Box::new(parquet::read(path)?));
-        }
-    } else if !source.is_packed() && FROM_FILES.iter().any(|known| begin.starts_with(known)) {
-        return Err(LogError::form(
-            name,
-            "its format is read from files only; write it to a file",
-        ));
-    }
-    if let Some((_, remedy)) = FOREIGN.iter().find(|(known, _)| begin.starts_with(known)) {
-        return Err(LogError::form(name, *remedy));
-    }
-    if begin.starts_with(mat::MAGIC) {
-        return Ok(Box::new(mat::read(name, &source)?));
-    }
-    Ok(Box::new(Csv::of(name, source)?))
+    format::read(path, Source::of(path)?, columns)
 }
