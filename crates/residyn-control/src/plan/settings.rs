@@ -46,8 +46,11 @@ pub enum Method {
     Mppi(Mppi),
 }
 
-/// Every method: its name, and the method with its usual settings for an elite of this size.
-const METHODS: [(&str, fn(usize) -> Method); 3] = [
+/// A method with its usual settings for an elite of this size.
+type Usual = fn(usize) -> Method;
+
+/// Every method with its name.
+const METHODS: [(&str, Usual); 3] = [
     ("cem", |elite| Method::Cem(Cem { elite })),
     ("icem", |elite| Method::Icem(Icem::new(elite))),
     ("mppi", |_| Method::Mppi(Mppi::default())),

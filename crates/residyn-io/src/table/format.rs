@@ -27,8 +27,10 @@ enum Reader {
         packed: &'static str,
     },
     /// Of bytes from their beginning, packed or not.
-    Bytes(fn(&Path, Source) -> Result<Box<dyn Table>, LogError>),
+    Bytes(OfBytes),
 }
+
+type OfBytes = fn(&Path, Source) -> Result<Box<dyn Table>, LogError>;
 
 /// Every format. A new one is one more entry here, before that of texts, which may begin with anything.
 pub const LOG_FORMATS: &[LogFormat] = &[

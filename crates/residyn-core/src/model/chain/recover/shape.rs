@@ -7,6 +7,9 @@ use crate::model::Dynamics;
 use crate::model::chain::equations::christoffel;
 use crate::model::chain::series::Series;
 
+/// The equations in a state: positions and velocities.
+type At<'a> = &'a dyn Fn(&[f64], &[f64]) -> DVector<f64>;
+
 /// Largest deviation of the equations from those of a mechanism, relative to the largest value of each entry.
 pub(super) const SAME: f64 = 1e-9;
 /// A number below this share of what it is added to is rounding.
@@ -129,9 +132,8 @@ impl Shape {
             let scaled = of_states.iter().map(|row| row.component_div(&sizes));
             DVector::from_vec(scaled.flat_map(|row| row.as_slice().to_vec()).collect())
         };
-        let column = |at: &dyn Fn(&[f64], &[f64]) -> DVector<f64>| {
-            scaled(&states.iter().map(|(q, qd)| at(q, qd)).collect::<Vec<_>>())
-        };
+        let column =
+            |at: At<'_>| scaled(&states.iter().map(|(q, qd)| at(q, qd)).collect::<Vec<_>>());
         let terms = self
             .terms
             .iter()
