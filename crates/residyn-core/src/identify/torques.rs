@@ -25,7 +25,7 @@ pub struct TorqueFit<'l> {
 /// well its torque is predicted; bodies stay physical.
 ///
 /// # Errors
-/// A model that gives accelerations or logs of less than two seconds, as [`FitError::NoWindow`], and those of [`fit`].
+/// A model that gives accelerations or logs of less than two seconds, as [`FitError::NoWindow`], and those of [`fit_by`].
 pub fn fit_torques<'l>(
     solver: &dyn Solver,
     model: &Model,
