@@ -85,7 +85,9 @@ fn error_of_torques(arm: &str, log: &str, from: f64) -> Option<f64> {
     let first = 1 + rows.len().min((from * count) as usize);
     let part = [&rows[..1], &rows[first..]].concat().join("\n");
     scratch.file("part.csv", part);
-    scratch.new_model(&data.join(format!("{arm}.urdf")));
+    let model = scratch.new_model(&data.join(format!("{arm}.urdf")));
+    let sampled = fs::read_to_string(&model).unwrap() + "\n[log]\ntorque = \"sampled\"\n";
+    scratch.file("model.toml", sampled);
     let evaluate = "evaluate --model model.toml --test part.csv";
     let message = scratch.json(&format!("{evaluate} --horizon 0.02 --torque"));
     let joints = message["torque"]["rms"].as_array().unwrap().len();

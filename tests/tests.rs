@@ -55,6 +55,7 @@ mod slow;
 mod support;
 mod sweep;
 mod terminal_summary;
+mod torque_columns;
 mod train;
 mod undeclared_effect;
 mod unexplained;

@@ -8,11 +8,11 @@ use serde::Serialize;
 use super::inputs::{self, Source};
 use super::status::NotFinite;
 use super::{Answer, Common, terminal};
-use residyn_core::data::{Joint, LeaveOut, Log, audit_together};
+use residyn_core::data::{Joint, LeaveOut, Log, TorqueColumn, audit_together};
 use residyn_core::identify::calibrate;
 use residyn_core::model::{Dynamics, Model};
 use residyn_core::sim::metric::{
-    Summary, TorqueError, assess, summarise, torque_error, torques_leave,
+    Summary, TorqueError, assess, summarise, torque_column, torque_error, torques_leave,
 };
 use residyn_io::{read_logs, read_model};
 use residyn_train::Checkpoint;
@@ -158,6 +158,7 @@ fn torque(model: &Model, logs: &[Log]) -> Result<TorqueError> {
             model.name
         );
     }
+    let logs = &with_known_torques(model, logs);
     let error = torque_error(model, logs)
         .ok_or_else(|| anyhow!("--torque: no log is longer than a second; give a longer one"))?;
     if !error.rms.iter().all(|rms| rms.is_finite()) {
@@ -172,6 +173,26 @@ fn torque(model: &Model, logs: &[Log]) -> Result<TorqueError> {
         )));
     }
     Ok(error)
+}
+
+/// The logs with torques of the kind that the model file gives or, without one, that the torque error shows.
+fn with_known_torques(model: &Model, logs: &[Log]) -> Vec<Log> {
+    let mut logs = logs.to_vec();
+    if model.columns.torque.is_none()
+        && let Some(column) = torque_column(model, &logs)
+        && column != TorqueColumn::Held
+    {
+        terminal::say(format!(
+            "note: the torque error takes the logged torques as `[log] torque = \"{0}\"`, with which it is clearly \
+             smaller than with held ones; put that into the model file for all other errors, or \"held\"",
+            column.key()
+        ));
+        logs = logs
+            .into_iter()
+            .map(|log| log.with_torques(column))
+            .collect();
+    }
+    logs
 }
 
 fn torques(error: &TorqueError) -> String {

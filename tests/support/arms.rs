@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use rand::RngExt;
-use residyn_core::data::Log;
+use residyn_core::data::{Log, TorqueColumn};
 use residyn_core::model::Model;
 use residyn_core::model::chain::Chain;
 
@@ -40,7 +40,7 @@ pub fn moved(model: &Model, seconds: f64, seed: u64) -> Log {
     let joints: Vec<Vec<[f64; 3]>> = (0..model.joints).map(|_| waves()).collect();
     let balance = model.torque_balance().unwrap();
     let (values, n) = (balance.values(), model.joints);
-    let mut log = Log::empty(n);
+    let mut log = Log::empty(n).with_torques(TorqueColumn::Sampled);
     for row in 0..(200.0 * seconds) as usize {
         let t = 0.005 * row as f64;
         let sum = |wave: &dyn Fn(&[f64; 3]) -> f64| -> Vec<f64> {

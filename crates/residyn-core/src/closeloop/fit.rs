@@ -13,8 +13,8 @@ use super::smoothing::width;
 use super::stage::{Stage, Watch};
 use super::start::around;
 use crate::identify::{
-    FitError, Identifiability, Open, Shooting, Values, cut, fit as fit_windows, fit_torques,
-    identifiability, open, uncertainty,
+    FitError, Identifiability, Open, Shooting, Values, cut, fit_by, fit_torques, identifiability,
+    open, uncertainty,
 };
 use crate::model::{FittedEffect, Library, Model};
 
@@ -199,13 +199,8 @@ impl<'a> Problem<'a> {
 
     fn fitted_over(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fitted, FitError> {
         self.fitted_by(model, |dynamics, active| {
-            fit_windows(
-                shooting,
-                dynamics,
-                active,
-                shooting.initial_start_states(0),
-                None,
-            )
+            let start_states = shooting.initial_start_states(0);
+            fit_by(self.solver, shooting, dynamics, active, start_states, None)
         })
     }
 

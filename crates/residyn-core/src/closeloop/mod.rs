@@ -38,6 +38,7 @@ mod stage;
 mod start;
 #[cfg(test)]
 mod tests;
+mod torque_column;
 mod torque_sign;
 mod verdict;
 

@@ -138,7 +138,7 @@ impl Given {
         prepared: &Prepared<'_>,
         (audits, fitted_tests): (Vec<Audit>, Vec<String>),
     ) -> Self {
-        let model = prepared.model;
+        let model = &prepared.model;
         Self {
             train: Arc::clone(&prepared.train.logs),
             studied: Arc::clone(&prepared.train.for_fits),

@@ -1,5 +1,6 @@
 //! Stages 1 and 2: the logs in order, audited, and in the form that fits use.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::error::StudyError;
@@ -18,8 +19,8 @@ use crate::sim::metric::window_count;
 
 /// The request, with its logs made ready.
 pub struct Prepared<'a> {
-    /// The declared model.
-    pub model: &'a Model,
+    /// The declared model; it says what the torques of the logs are.
+    pub model: Cow<'a, Model>,
     /// The effects that it may lack.
     pub library: &'a Library,
     /// Models to score as they are.
@@ -73,7 +74,7 @@ pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> 
         train: ready(split.train),
         test: ready(split.test),
         split: split.method,
-        model,
+        model: Cow::Borrowed(model),
         library: request.library,
         against: request.against,
         unscored_s,
@@ -82,6 +83,7 @@ pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> 
         learner: request.learner,
         settings: request.settings,
     }
+    .with_known_torques()
 }
 
 impl Prepared<'_> {
@@ -104,7 +106,7 @@ impl Prepared<'_> {
         if self.error_model == Some(ErrorModel::InverseDynamics)
             && self.model.torque_balance().is_none()
         {
-            return Err(StudyError::without_torques(self.model));
+            return Err(StudyError::without_torques(&self.model));
         }
         Ok(())
     }
@@ -123,7 +125,7 @@ impl Prepared<'_> {
         let logs = (&*self.train.for_fits, self.train.audits.clone());
         Problem {
             solver: self.solver,
-            ..Problem::audited(self.model, self.library, error_model, logs, &self.settings)
+            ..Problem::audited(&self.model, self.library, error_model, logs, &self.settings)
         }
     }
 

@@ -105,6 +105,10 @@ settings! {
         /// Up to this many joints, the errors of the motion are examined to choose between motion and torques; with
         /// more joints, a fit of the motion takes minutes before any search begins, and torques are compared.
         most_joints_by_motion: usize = 3,
+        /// Torques are taken as a sensor's readings or as means, unless the model file says what they are, if the model
+        /// with the usual friction leaves less than this share of what it leaves if they are held. The wrong one of the
+        /// three leaves several times as much where it matters.
+        other_torque_share: f64 = 0.9,
         /// A joint is at rest in a window if it moves less than this share of its farthest travel in any window (as
         /// squares): errors relative to no travel are meaningless.
         at_rest_share: f64 = 1e-2,

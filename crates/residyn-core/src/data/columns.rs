@@ -5,6 +5,7 @@ use std::path::Path;
 use super::column::{Column, Quantity};
 use super::error::{LogError, Place};
 use super::joint::Joint;
+use super::torque_column::TorqueColumn;
 use crate::expr::listed;
 
 /// Columns in which a log file holds time, angles, velocities and torques, and their units.
@@ -22,6 +23,8 @@ pub struct Columns {
     pub tau: Vec<Column>,
     /// Which of the two they are: [`Quantity::Torque`] or [`Quantity::Command`].
     pub driven_by: Quantity,
+    /// What the torques are, if it is known.
+    pub torque: Option<TorqueColumn>,
     /// The topic of a recording that has the joints; `None` if their names determine it.
     pub topic: Option<String>,
     /// Names of the joints, if they have any. A standard column that a header lacks may go by the name of its joint:
@@ -38,6 +41,7 @@ impl Default for Columns {
             qd: Some(vec![]),
             tau: vec![],
             driven_by: Quantity::Torque,
+            torque: None,
             topic: None,
             joint_names: vec![],
         }

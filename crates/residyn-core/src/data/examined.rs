@@ -90,6 +90,7 @@ impl Log {
             qd: self.qd.iter().map(cut).collect(),
             tau: self.tau.iter().map(cut).collect(),
             driven_by: self.driven_by,
+            torque: self.torque,
             masked: self.masked.iter().map(marked).collect(),
             filled: marked(&self.filled),
             leave_out: self.leave_out.clone(),

@@ -15,6 +15,7 @@ use super::instant::SAME_S;
 use super::jumps::{bridge, rows_that_jump};
 use super::signal::differences;
 use super::statistics::median_of;
+use super::torque_column::TorqueColumn;
 use crate::limits::is_reading;
 
 /// A span of a log's own time, both ends included.
@@ -60,10 +61,13 @@ pub struct Log {
     pub q: Vec<Vec<f64>>,
     /// Joint velocities \[rad/s\] as the rig reports them.
     pub qd: Vec<Vec<f64>>,
-    /// What drives the joints: torques \[N m\] or commands; row i acts from `time[i]` to `time[i + 1]`.
+    /// What drives the joints: torques \[N m\] or commands; row i acts from `time[i]` to `time[i + 1]`,
+    /// unless `torque` says otherwise.
     pub tau: Vec<Vec<f64>>,
     /// Which of the two: [`Quantity::Torque`] or [`Quantity::Command`].
     pub driven_by: Quantity,
+    /// What these are: held from row to row, readings at the rows, or means.
+    pub torque: TorqueColumn,
     /// Rows whose angle jumps and is not to be fitted, `[joint]`, in ascending order. The angle there is interpolated
     /// from the rows around. May be empty: none in a log as it is read.
     pub masked: Vec<Vec<usize>>,
@@ -86,6 +90,7 @@ impl Log {
             qd: vec![Vec::new(); joints],
             tau: vec![Vec::new(); joints],
             driven_by: Quantity::Torque,
+            torque: TorqueColumn::Held,
             masked: vec![Vec::new(); joints],
             filled: Vec::new(),
             leave_out: Vec::new(),

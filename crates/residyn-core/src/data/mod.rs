@@ -29,6 +29,7 @@ mod signal;
 mod smooth;
 pub mod statistics;
 mod table;
+pub(crate) mod torque_column;
 mod trajectory;
 
 pub(crate) use audit::reversed_driving;
@@ -50,4 +51,5 @@ pub use local_cubic::{LocalCubic, half_width_s, local_cubic};
 pub use log::{Interval, Log};
 pub use smooth::{Smooth, Smoothing};
 pub use table::{Arrays, Numbers, Numeric, Table};
+pub use torque_column::TorqueColumn;
 pub use trajectory::{Thinning, Trajectory, trajectories};

@@ -67,7 +67,7 @@ impl Log {
                 path: log.path,
                 rows,
             }),
-            _ => Ok(log),
+            _ => Ok(log.with_torques(columns.torque.unwrap_or_default())),
         }
     }
 

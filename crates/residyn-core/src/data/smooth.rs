@@ -3,6 +3,7 @@
 use super::instant::{ROUNDING, SAME_S};
 use super::log::Log;
 use super::low_pass::LowPass;
+use super::torque_column::TorqueColumn;
 use crate::limits::log_steps;
 
 /// Hz
@@ -37,6 +38,8 @@ pub struct Smoothing {
     filter: LowPass,
     /// Times of the log, s.
     logged: Vec<f64>,
+    /// The middle of each step of the log, s: where a torque that is held over it acts.
+    middle: Vec<f64>,
     /// Even times, s.
     even: Vec<f64>,
     /// Rows at even times that are used.
@@ -53,6 +56,7 @@ impl Smoothing {
         Self {
             step_s,
             filter: LowPass::new(cutoff),
+            middle: middles(&log.time, step_s),
             logged: log.time.clone(),
             used: inner.filter(|row| is_used(log, even[*row])).collect(),
             even,
@@ -70,15 +74,37 @@ impl Smoothing {
         }
     }
 
-    /// A channel of the log at the rows that are used.
-    pub fn channel(&self, channel: &[f64]) -> Vec<f64> {
-        self.used_of(&self.filtered(channel))
+    /// Values that are held from each row of the log to the next, at the rows that are used.
+    pub fn held(&self, values: &[f64]) -> Vec<f64> {
+        self.used_of(&self.filtered(&self.middle, values))
     }
 
-    /// The filtered channel at all even times.
-    fn filtered(&self, channel: &[f64]) -> Vec<f64> {
+    /// The torques of a joint at the rows that are used, each taken at the time at which it acted.
+    pub fn torques(&self, log: &Log, joint: usize) -> Vec<f64> {
+        match log.torque {
+            TorqueColumn::Sampled => self.used_of(&self.filtered(&self.logged, &log.tau[joint])),
+            _ => self.held(&log.held_torques(joint)),
+        }
+    }
+
+    /// The torques of a joint whose drive delivers these means from row to row, in the same way.
+    pub fn delivered(&self, log: &Log, joint: usize, means: &[f64]) -> Vec<f64> {
+        if log.torque != TorqueColumn::Sampled {
+            return self.held(means);
+        }
+        // The readings are finer than means between them, and equal where nothing is delayed.
+        let commanded = log.held_torques(joint);
+        let added: Vec<f64> = (means.iter().zip(&*commanded))
+            .map(|(d, c)| d - c)
+            .collect();
+        let both = self.torques(log, joint).into_iter().zip(self.held(&added));
+        both.map(|(tau, added)| tau + added).collect()
+    }
+
+    /// A channel with values at these times, filtered, at all even times.
+    fn filtered(&self, times: &[f64], values: &[f64]) -> Vec<f64> {
         let even = self.even.iter().copied();
-        let even: Vec<f64> = resampled(even, &self.logged, channel).collect();
+        let even: Vec<f64> = resampled(even, times, values).collect();
         self.filter.apply(&even)
     }
 
@@ -103,7 +129,11 @@ impl Smooth {
             used,
             ..
         } = smoothing;
-        let q: Vec<Vec<f64>> = (log.q.iter().map(|q| smoothing.filtered(q))).collect();
+        let q: Vec<Vec<f64>> = (log
+            .q
+            .iter()
+            .map(|q| smoothing.filtered(&smoothing.logged, q)))
+        .collect();
         let direction = |(q, width): (&Vec<f64>, &f64)| {
             let speed = |pair: &[f64]| (pair[2] - pair[0]) / (2.0 * step_s);
             let inner = q.windows(3).map(speed);
@@ -124,7 +154,9 @@ impl Smooth {
             qd: each(&|q, k| (q[k + 1] - q[k - 1]) / (2.0 * step_s)),
             qdd: each(&|q, k| (q[k + 1] - 2.0 * q[k] + q[k - 1]) / step_s.powi(2)),
             q: each(&|q, k| q[k]),
-            tau: (log.tau.iter().map(|tau| smoothing.channel(tau))).collect(),
+            tau: (0..log.joints())
+                .map(|joint| smoothing.torques(log, joint))
+                .collect(),
             time: smoothing.used_of(even),
         }
     }
@@ -133,6 +165,13 @@ impl Smooth {
     pub fn rows(&self) -> usize {
         self.time.len()
     }
+}
+
+/// The middle of the step after each row; the last one has the median length.
+fn middles(time: &[f64], step_s: f64) -> Vec<f64> {
+    let inner = time.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
+    let last = time.last().map(|last| last + 0.5 * step_s);
+    inner.chain(last).collect()
 }
 
 /// Even steps over the log; none if the log, or the part of one, is nearly all pause.
@@ -159,7 +198,7 @@ pub(super) fn resampled(
             row += 1;
         }
         let share = (time - rows[row]) / (rows[row + 1] - rows[row]);
-        channel[row] + share.min(1.0) * (channel[row + 1] - channel[row])
+        channel[row] + share.clamp(0.0, 1.0) * (channel[row + 1] - channel[row])
     })
 }
 
@@ -175,17 +214,26 @@ fn is_used(log: &Log, time: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::Smooth;
-    use crate::data::{Interval, Log};
+    use crate::data::{Interval, Log, TorqueColumn};
 
+    /// The torque is the cosine, whatever the column holds of it.
     #[test]
     fn a_slow_sine_is_differentiated_twice() {
-        let mut log = Log::empty(1);
+        let mean =
+            |from: f64, to: f64| ((3.0 * to).sin() - (3.0 * from).sin()) / (3.0 * (to - from));
+        smooths(TorqueColumn::Held, &|t| mean(t, t + 0.001));
+        smooths(TorqueColumn::Sampled, &|t| (3.0 * t).cos());
+        smooths(TorqueColumn::Mean, &|t| mean(t - 0.001, t));
+    }
+
+    fn smooths(column: TorqueColumn, torque: &dyn Fn(f64) -> f64) {
+        let mut log = Log::empty(1).with_torques(column);
         for k in 0..4000 {
             let t = 0.001 * f64::from(k);
             log.time.push(t);
             log.q[0].push((3.0 * t).sin());
             log.qd[0].push(0.0);
-            log.tau[0].push((3.0 * t).cos());
+            log.tau[0].push(torque(t));
         }
         log.leave_out = vec![Interval {
             start_s: 1.0,

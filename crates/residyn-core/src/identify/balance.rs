@@ -49,24 +49,26 @@ impl Acting {
         for (index, (log, rows)) in logs.iter().zip(rows).enumerate() {
             let own = values.of_log(index);
             let commands = Commands::of_log(Point::new(dynamics, &own), log);
-            let smoothed = |means: &[Mean], of: &dyn Fn(&Mean) -> f64| {
-                let channel: Vec<f64> = means.iter().map(of).collect();
-                rows.smoothing.channel(&channel)
+            let each = |means: &[Mean], of: &dyn Fn(&Mean) -> f64| -> Vec<f64> {
+                means.iter().map(of).collect()
             };
             let filtered: Vec<Option<Vec<Mean>>> = Joint::all(dynamics.joints)
                 .map(|joint| commands.delivered(joint))
                 .collect();
-            let tau = (rows.smooth.tau.iter().zip(&filtered)).map(|(tau, filtered)| {
-                let filtered = filtered
-                    .as_ref()
-                    .map(|means| smoothed(means, &|mean| mean.value));
-                filtered.unwrap_or_else(|| tau.clone())
+            let smoothed = (rows.smooth.tau.iter()).zip(&filtered).enumerate();
+            let tau = smoothed.map(|(joint, (tau, filtered))| match filtered {
+                Some(means) => {
+                    let means = each(means, &|mean| mean.value);
+                    rows.smoothing.delivered(log, joint, &means)
+                }
+                None => tau.clone(),
             });
             acting.tau.push(tau.collect());
             let slopes = dynamics.filters.iter().map(|filter| {
                 let means = filtered[filter.joint].as_ref();
                 let means = means.expect("the joint has a filter");
-                smoothed(means, &|mean| mean.slope(filter.kind))
+                rows.smoothing
+                    .held(&each(means, &|mean| mean.slope(filter.kind)))
             });
             acting.slopes.push(slopes.collect());
         }

@@ -81,7 +81,7 @@ impl Pack {
                 // Padding has steps of zero length.
                 pack.dt[row][lane] = log.time[(at + 1).min(window.last)] - log.time[at];
                 for j in 0..n {
-                    pack.tau[row][j][lane] = log.tau[j][at];
+                    pack.tau[row][j][lane] = log.held(j, at);
                     pack.q[row][j][lane] = log.q[j][at];
                     let masked = log.is_masked(j, at);
                     let counts = lane < members.len() && row < window.rows() && !masked;

@@ -12,7 +12,7 @@ use super::reader::{Document, FileError, Located, Section};
 use super::system::{Energy, Equations, Model, Motion, Places};
 use super::tables::{ChainTable, EnergyTable, ModelFile};
 use super::{chain_in_file, effects_in_file, sections};
-use crate::data::{Joint, Quantity};
+use crate::data::{Columns, Joint, Quantity};
 use crate::expr::{Formula, Graph, Scope, parse};
 
 impl Model {
@@ -46,7 +46,10 @@ impl Model {
             smoothing_velocity: system.smoothing_velocity,
             name: system.name,
             about: system.about.unwrap_or_default(),
-            columns: columns(file.columns, joints, driven_by, &system.joint_names)?,
+            columns: Columns {
+                torque: file.log.and_then(|log| log.torque),
+                ..columns(file.columns, joints, driven_by, &system.joint_names)?
+            },
             joint_names: system.joint_names,
             parameters: sections::parameters(file.parameters)?,
             effects: effects_in_file::read(&file.effect, joints, library)?,

@@ -8,6 +8,7 @@ use super::effect::Measure;
 use super::filter::CommandFilter;
 use super::reader::{Entry, FileError, Located, Section};
 use super::values::{ActsOn, EachLog, Limits, Named, OrTable, Read};
+use crate::data::TorqueColumn;
 use crate::expr::Formula;
 
 /// Structs that are read from a table, each field from the key of its name.
@@ -47,6 +48,7 @@ tables! {
     struct ModelFile<'a> {
         system: SystemTable<'a>,
         columns: Option<Section<'a>>,
+        log: Option<LogTable<'a>>,
         drive: Option<Section<'a>>,
         parameters: Named<ParameterTable<'a>>,
         dynamics: Option<Section<'a>>,
@@ -63,6 +65,11 @@ tables! {
         joint_names: Vec<String>,
         prismatic: Vec<usize>,
         smoothing_velocity: Option<Vec<f64>>,
+    }
+
+    /// What is known of all logs.
+    struct LogTable<'a> {
+        torque: Option<TorqueColumn>,
     }
 
     /// A column that is not read as it is.

@@ -6,6 +6,7 @@ use super::effect::Measure;
 use super::filter::CommandFilter;
 use super::fitted::Status;
 use super::reader::{Entry, FileError, Located, Section};
+use crate::data::TorqueColumn;
 use crate::expr::Formula;
 
 /// 2^53: above it, floating point skips whole numbers.
@@ -219,6 +220,14 @@ impl Word for Measure {
 
 impl Word for CommandFilter {
     const WORDS: &'static [(&'static str, Self)] = &[("delay", Self::Delay), ("lag", Self::Lag)];
+}
+
+impl Word for TorqueColumn {
+    const WORDS: &'static [(&'static str, Self)] = &[
+        (Self::Held.key(), Self::Held),
+        (Self::Sampled.key(), Self::Sampled),
+        (Self::Mean.key(), Self::Mean),
+    ];
 }
 
 impl Word for ActsOn {

@@ -51,6 +51,9 @@ impl Model {
                 }
             }
         }
+        if let Some(torque) = self.columns.torque {
+            document["log"]["torque"] = toml_edit::value(torque.key());
+        }
         // Predictions are only reproduced with the same smoothing of dry friction.
         if let Some(widths) = &self.smoothing_velocity {
             let widths: toml_edit::Array = widths.iter().copied().collect();

@@ -1,7 +1,9 @@
 //! Delays and lags between commanded and acting torque: linear filters of the command, independent of the state.
 
+use std::borrow::Cow;
+
 use super::{Hold, Point};
-use crate::data::{Joint, Log};
+use crate::data::{Joint, Log, TorqueColumn};
 use crate::lanes::Row;
 use crate::model::{CommandFilter, Filter};
 
@@ -12,7 +14,8 @@ use crate::model::{CommandFilter, Filter};
 #[derive(Debug, Clone)]
 pub struct Commands<'l> {
     time: &'l [f64],
-    tau: &'l [Vec<f64>],
+    /// The command of each joint, held from each row on.
+    tau: Vec<Cow<'l, [f64]>>,
     joints: usize,
     /// The model's filters, in the order of [`StepTorque::slopes`].
     filters: Vec<Filter>,
@@ -43,7 +46,11 @@ impl Mean {
 impl<'l> Commands<'l> {
     /// Filter the torques `tau` (`[joint][row]`), each held from `time[row]` (s) on.
     pub fn new<'p>(model: impl Into<Point<'p>>, time: &'l [f64], tau: &'l [Vec<f64>]) -> Self {
-        let model = model.into();
+        let tau = tau.iter().map(|tau| Cow::Borrowed(tau.as_slice()));
+        Self::held_in(model.into(), time, tau.collect())
+    }
+
+    fn held_in(model: Point<'_>, time: &'l [f64], tau: Vec<Cow<'l, [f64]>>) -> Self {
         let (dynamics, values) = (model.dynamics, model.values());
         let history = |joint: Joint| {
             let own = |kind: CommandFilter| {
@@ -53,20 +60,21 @@ impl<'l> Commands<'l> {
             let (delay, lag) = (own(CommandFilter::Delay), own(CommandFilter::Lag));
             let value = |filter: Option<&Filter>| filter.map_or(0.0, |f| values[f.parameter]);
             (delay.is_some() || lag.is_some())
-                .then(|| History::new(time, &tau[joint], value(delay), value(lag)))
+                .then(|| History::new(time, tau[joint.index()].clone(), value(delay), value(lag)))
         };
         Self {
             time,
-            tau,
             joints: dynamics.joints,
             filters: dynamics.filters.clone(),
             histories: Joint::all(dynamics.joints).map(history).collect(),
+            tau,
         }
     }
 
     /// Filter the torques of a log.
     pub fn of_log<'p>(model: impl Into<Point<'p>>, log: &'l Log) -> Self {
-        Self::new(model, &log.time, &log.tau)
+        let tau = (0..log.joints()).map(|joint| log.held_torques(joint));
+        Self::held_in(model.into(), &log.time, tau.collect())
     }
 
     /// The time (s) of one row per lane.
@@ -97,17 +105,18 @@ impl<'l> Commands<'l> {
     pub fn acting_on(&self, log: &Log) -> Log {
         Log {
             tau: self.acting(),
+            torque: TorqueColumn::Held,
             ..log.clone()
         }
     }
 
     /// The mean acting torque from each row to the next, `[joint][row]`.
     pub fn acting(&self) -> Vec<Vec<f64>> {
-        let of_joint = |(joint, commanded): (Joint, &Vec<f64>)| match self.delivered(joint) {
+        let of_joint = |(joint, commanded): (Joint, &Cow<'_, [f64]>)| match self.delivered(joint) {
             Some(means) => means.iter().map(|mean| mean.value).collect(),
-            None => commanded.clone(),
+            None => commanded.to_vec(),
         };
-        let all = Joint::all(self.joints).zip(self.tau);
+        let all = Joint::all(self.joints).zip(&self.tau);
         all.map(of_joint).collect()
     }
 
@@ -118,7 +127,7 @@ impl<'l> Commands<'l> {
         let means = ends.windows(2).map(|ends| ends[0].mean_until(&ends[1]));
         // The last command is held for ever.
         let last = Mean {
-            value: *self.tau[joint].last()?,
+            value: *self.tau[joint.index()].last()?,
             ..Mean::default()
         };
         Some(means.chain([last]).collect())
@@ -211,7 +220,7 @@ struct History<'l> {
     lag: f64,
     time: &'l [f64],
     /// The command held from each row on.
-    command: &'l [f64],
+    command: Cow<'l, [f64]>,
     /// At each row: integral of the command since the first row, output of the lag, derivative of the output with
     /// respect to `lag`.
     integral: Vec<f64>,
@@ -231,20 +240,20 @@ struct Instant {
 }
 
 impl<'l> History<'l> {
-    fn new(time: &'l [f64], command: &'l [f64], delay: f64, lag: f64) -> Self {
+    fn new(time: &'l [f64], command: Cow<'l, [f64]>, delay: f64, lag: f64) -> Self {
         let mut history = Self {
             delay,
             lag,
             time,
-            command,
             integral: vec![0.0],
             output: vec![command[0]],
             output_by_lag: vec![0.0],
+            command,
         };
         for row in 1..time.len() {
             let span = time[row] - time[row - 1];
             let (output, output_by_lag) = history.within(row - 1, span);
-            let integral = history.integral[row - 1] + command[row - 1] * span;
+            let integral = history.integral[row - 1] + history.command[row - 1] * span;
             history.integral.push(integral);
             history.output.push(output);
             history.output_by_lag.push(output_by_lag);

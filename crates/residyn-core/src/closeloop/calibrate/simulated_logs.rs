@@ -100,7 +100,7 @@ fn apart(problem: &Problem<'_>) -> Vec<Log> {
                 for j in 0..log.joints() {
                     out.q[j].push(log.q[j][row]);
                     out.qd[j].push(log.qd[j][row]);
-                    out.tau[j].push(log.tau[j][row]);
+                    out.tau[j].push(log.held(j, row));
                 }
             }
         }

@@ -60,7 +60,7 @@ pub fn score(
     let without_network = refined.after.model.absorbed().dynamics();
     let models = Scored {
         error_model: problem.error_model,
-        declared: prepared.model,
+        declared: &prepared.model,
         before: &refined.before,
         with_friction: with_friction.filter(|model| !problem.added(&model.model).is_empty()),
         after: &refined.after,

@@ -12,5 +12,7 @@ pub use open_loop::{assess, window_count};
 pub use open_loop::{errors_in, windows};
 pub use summary::{Summary, summarise};
 pub(crate) use torque::balance_of;
-pub use torque::{NeededTorques, TorqueError, needed_torques, torque_error, torques_leave};
+pub use torque::{
+    NeededTorques, TorqueError, needed_torques, torque_column, torque_error, torques_leave,
+};
 pub use trace::{Trace, traces};

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::data::{Log, Smooth};
+use crate::data::{Joint, Log, Smooth, Smoothing, TorqueColumn};
 use crate::lanes::Row;
 use crate::model::{Dynamics, Model};
 use crate::sim::Commands;
@@ -75,6 +75,21 @@ fn blocks((logged, differences): &(Smooth, Vec<Vec<f64>>)) -> Vec<f64> {
     blocks.map(|rows| rows.iter().map(square).sum()).collect()
 }
 
+/// Another kind of torques than held ones leaves at most this share of their error.
+const CLEARLY: f64 = 0.9;
+
+/// What the torques of logs are, by a model's torque error: held, unless another kind leaves clearly less. `None` if there
+/// is no such error.
+pub fn torque_column(model: &Model, logs: &[Log]) -> Option<TorqueColumn> {
+    let left = TorqueColumn::ALL.map(|column| {
+        let logs: Vec<Log> = (logs.iter().cloned())
+            .map(|log| log.with_torques(column))
+            .collect();
+        Some(torque_error(model, &logs)?.relative)
+    });
+    left[0].map(|_| TorqueColumn::clearest(&left, CLEARLY))
+}
+
 /// Where the torques that a model needs for the logged motion are first not finite: the log, and the time in s.
 pub fn torques_leave(model: &Model, logs: &[Log]) -> Option<(String, f64)> {
     logs.iter().find_map(|log| {
@@ -114,10 +129,22 @@ pub fn needed_torques(model: &Model, log: &Log) -> Option<NeededTorques> {
 /// A log, smoothed, and the torques that its motion needs beyond those that act, `[joint][row]`.
 fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
     let in_log = balance.in_log(log);
-    let logged = Smooth::of(log);
-    let filtered = (!in_log.filters.is_empty())
-        .then(|| Smooth::of(&Commands::of_log(&*in_log, log).acting_on(log)));
-    let found = balance_of(&in_log, filtered.as_ref().unwrap_or(&logged));
+    let smoothing = Smoothing::of(log);
+    let logged = Smooth::by(&smoothing, log, &[]);
+    let commands = Commands::of_log(&*in_log, log);
+    let of_joint = |(joint, tau): (Joint, &Vec<f64>)| match commands.delivered(joint) {
+        Some(means) => {
+            let means: Vec<f64> = means.iter().map(|mean| mean.value).collect();
+            smoothing.delivered(log, joint.index(), &means)
+        }
+        None => tau.clone(),
+    };
+    let acting = Joint::all(balance.joints).zip(&logged.tau).map(of_joint);
+    let acting = Smooth {
+        tau: acting.collect(),
+        ..logged.clone()
+    };
+    let found = balance_of(&in_log, &acting);
     (logged, found)
 }
 
