@@ -25,6 +25,7 @@ mod notes;
 mod outcome;
 mod payload;
 mod pipeline;
+mod plainer;
 mod prepare;
 mod problem;
 mod refine;

@@ -13,11 +13,12 @@ use super::learn::learn;
 use super::loss::Loss;
 use super::notes::noted;
 use super::outcome::{Diagnostics, Effects, Given, Models, Outcome};
+use super::plainer::{Plainer, plainer};
 use super::prepare::{Prepared, prepare};
 use super::refine::refine;
 use super::request::Request;
 use super::score::score;
-use super::select::{select, select_from};
+use super::select::{Selected, Trial, select, select_from};
 use super::stage::{Stage, Watch};
 use crate::data::Log;
 
@@ -94,6 +95,10 @@ pub fn find<'a>(
         best = other;
         left = best.diagnose(rng);
     }
+    if let Some(plainer) = best.plainer(apart, watch) {
+        best = plainer;
+        left = best.diagnose(rng);
+    }
     Ok(judge(best.declared, best.chosen, left, apart, rng))
 }
 
@@ -138,6 +143,26 @@ impl<'a> Searched<'a> {
         let declared = Declared { problem, fitted };
         let other = Self { declared, chosen };
         (!other.chosen.standings.is_empty() && other.loss() < self.loss()).then_some(other)
+    }
+
+    /// The same search with a plainer model in place of the chosen one, if it predicts whole logs better.
+    fn plainer(&self, apart: &[Log], watch: &dyn Watch) -> Option<Self> {
+        let Declared { problem, fitted } = &self.declared;
+        let Plainer {
+            fitted: plain,
+            reason,
+        } = plainer(problem, fitted, &self.chosen.after, apart)?;
+        let selected = Selected {
+            chosen: Ok(Trial::of(problem, plain)),
+            rounds: self.chosen.rounds.clone(),
+            stopped: self.chosen.stopped,
+        };
+        let chosen = Chosen {
+            replaced: Some(reason),
+            ..establish(problem, fitted, selected, watch)
+        };
+        let declared = self.declared.clone();
+        Some(Self { declared, chosen })
     }
 
     fn loss(&self) -> f64 {

@@ -129,6 +129,9 @@ settings! {
         most_effects: usize = 12,
         /// A set has at most this many effects per joint of the model, if that is more than `most_effects`.
         most_effects_per_joint: usize = 4,
+        /// A plainer model takes the place of the chosen one if its error on whole logs that the fit has not seen is lower
+        /// by this share: less is chance.
+        plainer_gain: f64 = 0.02,
         /// Effects with a value for each log are considered for at most this many logs: the time for one set grows with
         /// the cube of the number of its values.
         most_logs_of_own_values: usize = 64,

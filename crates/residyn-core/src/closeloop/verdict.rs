@@ -29,6 +29,16 @@ pub(super) fn verdict(
     refined: &Refined<'_>,
     errors: &Errors,
 ) -> (Verdict, String) {
+    let (verdict, reason) = concluded(found, refined, errors);
+    let replaced = found.chosen.replaced.iter();
+    let reasons: Vec<&str> = [reason.as_str()]
+        .into_iter()
+        .chain(replaced.map(String::as_str))
+        .collect();
+    (verdict, reasons.join("; "))
+}
+
+fn concluded(found: &Found<'_>, refined: &Refined<'_>, errors: &Errors) -> (Verdict, String) {
     let problem = &found.problem;
     let added = problem.added(&found.chosen.after.model).len();
     let established = found.chosen.established();

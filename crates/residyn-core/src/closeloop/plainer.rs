@@ -1,0 +1,183 @@
+//! Stage 4, at its end: whether logs that a fit has not seen are predicted better without the effects that were chosen.
+
+use rayon::prelude::*;
+
+use super::error_model::ErrorModel;
+use super::fitted::Fitted;
+use super::problem::Problem;
+use crate::data::Log;
+use crate::identify::Values;
+use crate::sim::FIT_S;
+use crate::sim::metric::{errors_in, windows};
+
+/// Most groups of logs that are left out in turn.
+const GROUPS: usize = 4;
+
+/// A plainer model that takes the place of the chosen one, and why.
+pub(super) struct Plainer {
+    pub fitted: Fitted,
+    /// The end of a sentence.
+    pub reason: String,
+}
+
+/// The model with the usual friction, or the declared one, if it predicts whole logs better than the chosen one: those
+/// left out of a fit of the others in turn, and those set `apart`, to which nothing is fitted. The search compares
+/// short windows of logs that it knows.
+pub(super) fn plainer(
+    problem: &Problem<'_>,
+    declared: &Fitted,
+    chosen: &Fitted,
+    apart: &[Log],
+) -> Option<Plainer> {
+    if problem.added(&chosen.model).is_empty() {
+        return None;
+    }
+    let usual = problem.with_usual_friction();
+    let usual = usual.filter(|usual| !has_same_effects(usual, chosen));
+    let others = usual.iter().map(|usual| (usual, "with the usual friction"));
+    let others = others.chain([(declared, "as declared")]);
+    let models = others.map(|(model, name)| (model, name, LeftOut::of(problem, model, apart)));
+    let mut best: Option<(&Fitted, &str, f64)> = None;
+    let mut least = LeftOut::of(problem, chosen, apart);
+    for (model, name, left) in models.collect::<Vec<_>>() {
+        if let Some(gain) = left.gain_over(&least, problem.settings.select.plainer_gain) {
+            (best, least) = (Some((model, name, gain)), left);
+        }
+    }
+    best.map(|(model, name, gain)| Plainer {
+        fitted: model.clone(),
+        reason: format!(
+            "the effects that the search found are not used: on whole logs that the fit had not seen, the error of the \
+             model {name} is lower by {:.0} %",
+            100.0 * (1.0 - (-gain).exp())
+        ),
+    })
+}
+
+fn has_same_effects(a: &Fitted, b: &Fitted) -> bool {
+    let [a, b] = [a, b].map(|fitted| &fitted.model.effects);
+    a.len() == b.len() && a.iter().all(|a| b.iter().any(|b| a.is_same(b)))
+}
+
+/// Logarithms of a model's errors on whole logs that a fit has not seen; `None` if there are none.
+struct LeftOut {
+    /// Left out of the training logs in turn.
+    in_turn: Option<f64>,
+    apart: Option<f64>,
+}
+
+impl LeftOut {
+    fn of(problem: &Problem<'_>, fitted: &Fitted, apart: &[Log]) -> Self {
+        let (in_turn, apart) = rayon::join(
+            || left_in_turn(problem, fitted),
+            || Some(squares(problem, fitted, apart)).filter(|_| !apart.is_empty()),
+        );
+        Self {
+            in_turn: in_turn.map(|squares| log_error(&squares)),
+            apart: apart.map(|squares| log_error(&squares)),
+        }
+    }
+
+    /// By how much the logarithm of the error is lower than another's, over both kinds of logs, if it is lower by more
+    /// than `least` on one of them.
+    fn gain_over(&self, other: &Self, least: f64) -> Option<f64> {
+        let gain = |own: Option<f64>, other: Option<f64>| Some(other? - own?);
+        let gains = [
+            gain(self.in_turn, other.in_turn),
+            gain(self.apart, other.apart),
+        ];
+        let known: Vec<f64> = gains.into_iter().flatten().collect();
+        let sum: f64 = known.iter().sum();
+        (sum > 0.0 && known.iter().any(|gain| *gain > least)).then_some(sum / known.len() as f64)
+    }
+}
+
+/// The logarithm of the root of each sum of squares, on average.
+fn log_error(squares: &[f64]) -> f64 {
+    let sum: f64 = squares.iter().map(|square| 0.5 * square.ln()).sum();
+    sum / squares.len() as f64
+}
+
+/// The squares on the training logs, each predicted by a fit to others; `None` for a single log, and for values that
+/// belong to one log.
+fn left_in_turn(problem: &Problem<'_>, fitted: &Fitted) -> Option<Vec<f64>> {
+    let groups = GROUPS.min(problem.logs.len());
+    let effects = &fitted.model.effects;
+    let of_one_log = effects.iter().flat_map(|effect| &effect.effect.parameters);
+    if groups < 2 || of_one_log.clone().any(|parameter| parameter.per_log) {
+        return None;
+    }
+    let of_group = |group: usize| -> Vec<f64> {
+        let split = |is_left_out: bool| -> Vec<Log> {
+            let logs = problem.logs.iter().enumerate();
+            let own = logs.filter(|(k, _)| (k % groups == group) == is_left_out);
+            own.map(|(_, log)| log.clone()).collect()
+        };
+        let (kept, left_out) = (split(false), split(true));
+        let problem = problem.on(&kept);
+        let start_states = problem.shooting.initial_start_states(0);
+        match problem.refit(&fitted.model, start_states, Some(fitted.fit.scale)) {
+            Ok(refitted) => squares(&problem, &refitted, &left_out),
+            Err(_) => vec![f64::INFINITY],
+        }
+    };
+    let groups: Vec<Vec<f64>> = (0..groups).into_par_iter().map(of_group).collect();
+    let longest = groups.iter().map(Vec::len).max()?;
+    let sum = |k: usize| {
+        groups
+            .iter()
+            .map(|squares| squares.get(k).unwrap_or(&f64::INFINITY))
+            .sum()
+    };
+    Some((0..longest).map(sum).collect())
+}
+
+/// Sums of squares of the errors: of the open-loop motion at each horizon, or of the torques over their noise, with
+/// friction that reverses as slowly as the smoothed torques do.
+fn squares(problem: &Problem<'_>, fitted: &Fitted, logs: &[Log]) -> Vec<f64> {
+    if problem.error_model == ErrorModel::InverseDynamics {
+        let problem = problem.on(logs);
+        let (dynamics, shooting) = (problem.compiled(&fitted.model), &problem.shooting);
+        let values = Values::of(&dynamics, logs);
+        let left = shooting.residuals(&dynamics, &values, &shooting.initial_start_states(0));
+        return vec![left.iter().flatten().map(|left| left * left).sum()];
+    }
+    let dynamics = fitted.model.dynamics();
+    let at = |horizon_s: &f64| {
+        let of_log = |(k, log): (usize, &Log)| windows(k, log, *horizon_s);
+        let windows: Vec<_> = logs.iter().enumerate().flat_map(of_log).collect();
+        let errors = errors_in(&dynamics, logs, &windows, FIT_S);
+        errors.iter().flat_map(|error| &error.position).sum()
+    };
+    problem.settings.score.horizons_s.iter().map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::LeftOut;
+
+    #[test]
+    fn a_plainer_model_has_to_be_better_by_more_than_chance() {
+        let left = |in_turn: Option<f64>, apart: Option<f64>| LeftOut { in_turn, apart };
+        let chosen = left(Some(0.0), Some(0.0));
+        for (in_turn, apart, gain) in [
+            (Some(-0.1), Some(0.0), Some(0.05)),
+            (Some(0.01), Some(-0.1), Some(0.045)),
+            // No better than chance on either, or better on one by less than it is worse on the other.
+            (Some(-0.01), Some(-0.01), None),
+            (Some(-0.1), Some(0.2), None),
+            // A single training log, and no log apart.
+            (None, Some(-0.1), Some(0.1)),
+            (None, None, None),
+            // A model that diverges.
+            (Some(f64::INFINITY), Some(-0.1), None),
+        ] {
+            let found = left(in_turn, apart).gain_over(&chosen, 0.02);
+            let is_same = match (found, gain) {
+                (Some(found), Some(gain)) => (found - gain).abs() < 1e-12,
+                (found, gain) => found == gain,
+            };
+            assert!(is_same, "{in_turn:?}, {apart:?}: {found:?}, not {gain:?}");
+        }
+    }
+}
