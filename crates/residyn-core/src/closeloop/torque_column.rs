@@ -11,14 +11,15 @@ use crate::data::torque_column::share_of_held;
 use crate::data::{Finding, Log, Quantity, Severity, TorqueColumn};
 use crate::identify::fit_torques;
 
-/// What the torques are is the same in all logs: so many show it.
+/// The torques of all logs are of one kind, and this many logs suffice to show which.
 const FEW: usize = 3;
 
 impl Prepared<'_> {
-    /// The same with the torques of all logs read as what they are: as the model file says or, by its fit to the
-    /// training logs, as what explains far more of the motion than held torques do.
+    /// The same with the torques of all logs taken as what they are: as the model file or the logs say or, by its fit to
+    /// the training logs, as the kind that explains clearly more than held torques do.
     pub(super) fn with_known_torques(mut self) -> Self {
-        let is_known = self.model.columns.torque.is_some();
+        let is_held = |log: &Log| log.torque == TorqueColumn::Held;
+        let is_known = self.model.columns.torque.is_some() || !self.train.logs.iter().all(is_held);
         if is_known || self.model.driven_by() != Quantity::Torque {
             return self;
         }
