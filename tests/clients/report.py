@@ -26,7 +26,7 @@ assert call["command"].startswith("residyn closeloop ") and call["took_s"] > 0, 
 began = datetime.datetime.fromisoformat(call["began"].replace("Z", "+00:00"))
 assert datetime.timedelta(0) <= datetime.datetime.now(datetime.timezone.utc) - began < datetime.timedelta(hours=1), began
 for file in call["inputs"]:
-    # Paths are as the command was given them, in the folder in which it made the report's.
+    # Paths are relative to the folder in which the command ran, here the report's parent.
     assert hashlib.sha256((folder.parent / file["path"]).read_bytes()).hexdigest() == file["sha256"], file["path"]
 
 horizons, joints = len(report["error"]["horizons_s"]), report["joints"]
