@@ -160,7 +160,11 @@ impl<'a> Problem<'a> {
 
     /// The declared model with these effects, fitted from these values: over short windows, then over the problem's
     /// windows.
-    fn fitted_beside(&self, start: &Model, effects: &[FittedEffect]) -> Result<Fitted, FitError> {
+    pub(super) fn fitted_beside(
+        &self,
+        start: &Model,
+        effects: &[FittedEffect],
+    ) -> Result<Fitted, FitError> {
         let short = self.windows_of(self.settings.fit.short_window_s);
         let own = &self.declared.effects;
         let model = start.with_effects([own.as_slice(), effects].concat());

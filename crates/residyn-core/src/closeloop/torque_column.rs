@@ -5,11 +5,12 @@ use rayon::prelude::*;
 use super::error_model::ErrorModel;
 use super::prepare::{Prepared, ReadyLogs};
 use super::problem::Problem;
-use super::select::baseline_friction;
+use super::select::baseline_sets;
 use crate::data::statistics::mean;
 use crate::data::torque_column::share_of_held;
 use crate::data::{Finding, Log, Quantity, Severity, TorqueColumn};
 use crate::identify::fit_torques;
+use crate::model::FittedEffect;
 
 /// The torques of all logs are of one kind, and this many logs suffice to show which.
 const FEW: usize = 3;
@@ -77,7 +78,7 @@ impl Problem<'_> {
         };
         let by_motion = match self.declared.joints > self.settings.fit.most_joints_by_motion {
             true => Vec::new(),
-            false => left(|problem| Some(problem.with_usual_friction()?.fit.scale)),
+            false => left(|problem| problem.motion_noise()),
         };
         let by_torques = left(|problem| problem.torque_noise());
         let share = |left: &Vec<Option<f64>>| share_of_held(left).map_or(1.0, |(share, _)| share);
@@ -88,11 +89,22 @@ impl Problem<'_> {
         TorqueColumn::clearest(&clearer, self.settings.fit.other_torque_share)
     }
 
-    /// What the declared model with the usual friction leaves of the torques: the geometric mean over the joints. `None` if
+    /// What the declared model with the usual friction and a constant torque leaves of the motion; `None` if it diverges.
+    fn motion_noise(&self) -> Option<f64> {
+        let fitted = self.fitted_beside(&self.started_from(), &self.usual_forces());
+        Some(fitted.ok()?.fit.scale)
+    }
+
+    /// The usual friction and a constant torque: without them, torques of another kind may explain what they do.
+    fn usual_forces(&self) -> Vec<FittedEffect> {
+        let sets = baseline_sets(self).into_iter();
+        sets.take(2).last().unwrap_or_default()
+    }
+
+    /// What the same model leaves of the torques: the geometric mean over the joints. `None` if
     /// it gives accelerations, or diverges.
     fn torque_noise(&self) -> Option<f64> {
-        let friction = baseline_friction(self);
-        let effects = [self.declared.effects.as_slice(), &friction].concat();
+        let effects = [self.declared.effects.as_slice(), &self.usual_forces()].concat();
         let model = self.smoothed(&self.declared.with_effects(effects));
         let found = fit_torques(self.solver, &model, self.declared, self.logs).ok()?;
         let noise = found.shooting.noise.iter().map(|noise| noise.ln());
