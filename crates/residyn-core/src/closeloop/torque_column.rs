@@ -98,7 +98,7 @@ impl Problem<'_> {
     /// The usual friction and a constant torque: without them, torques of another kind may explain what they do.
     fn usual_forces(&self) -> Vec<FittedEffect> {
         let sets = baseline_sets(self).into_iter();
-        sets.take(2).last().unwrap_or_default()
+        sets.take(2).next_back().unwrap_or_default()
     }
 
     /// What the same model leaves of the torques: the geometric mean over the joints. `None` if
