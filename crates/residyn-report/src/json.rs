@@ -165,7 +165,7 @@ pub(super) fn parameter(parameter: &Parameter) -> ParameterEntry {
         ci95: parameter.ci95,
         unit: parameter.unit.clone(),
         identifiable: parameter.ci95.is_some_and(narrow),
-        at_bound: parameter.ci95.is_some() && parameter.bounds.contains(&parameter.value),
+        at_bound: !parameter.fixed && parameter.bounds.contains(&parameter.value),
     }
 }
 

@@ -57,8 +57,8 @@ pub struct Chosen {
     pub stopped: bool,
     /// Effects that explain the logs as well as one that was chosen.
     pub rivals: Vec<Rival>,
-    /// Why a plainer model has taken the place of the one that the search found, if so.
-    pub replaced: Option<String>,
+    /// Why plainer models have taken the place of the one that the search found, in turn.
+    pub replaced: Vec<String>,
     /// Why there are no effects, if the chosen model could not be fitted.
     pub failure: Option<FitError>,
 }
@@ -90,7 +90,7 @@ pub fn establish(
         rounds: selected.rounds,
         stopped: selected.stopped,
         rivals: Vec::new(),
-        replaced: None,
+        replaced: Vec::new(),
         failure: None,
     };
     let chosen = match selected.chosen {

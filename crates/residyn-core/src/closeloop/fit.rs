@@ -1,20 +1,20 @@
 //! Stage 3: fit the declared model.
 
 use std::collections::BTreeSet;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use super::error::StudyError;
 use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::prepare::Prepared;
 use super::problem::Problem;
-use super::select::baseline_friction;
+use super::select::{baseline_friction, usual_forces};
 use super::smoothing::width;
 use super::stage::{Stage, Watch};
 use super::start::around;
 use crate::identify::{
     FitError, Identifiability, Open, Shooting, Values, cut, fit_by, fit_torques, identifiability,
-    open, uncertainty,
+    longest_stable_step, open, uncertainty,
 };
 use crate::model::{FittedEffect, Library, Model};
 
@@ -45,34 +45,42 @@ fn cost((fitted, _): &ByMotion) -> f64 {
 pub fn fit<'a>(prepared: &'a Prepared<'_>, watch: &dyn Watch) -> Result<Declared<'a>, StudyError> {
     prepared.check()?;
     let mut problem = prepared.problem(prepared.error_model.unwrap_or(ErrorModel::OutputError));
-    if prepared.error_model.is_none() && problem.is_prescribed() {
-        problem = prepared.problem(ErrorModel::InverseDynamics);
+    watch.see(Stage::Fit.into());
+    if prepared.error_model.is_none() {
+        problem = match problem.is_prescribed() {
+            true => prepared.problem(ErrorModel::InverseDynamics),
+            false => problem.with_first_optimum(),
+        };
+        if problem.is_imposed() {
+            problem = prepared.problem(ErrorModel::InverseDynamics);
+        }
     }
     if !problem.moves() {
         problem.library = &NOTHING;
     }
-    watch.see(Stage::Fit.into());
     problem.fit_declared()
 }
 
 impl<'a> Problem<'a> {
     /// Fit the declared model, with the effects that its file carries, from its declared values: over short windows, in
-    /// which even a poor start does not diverge, then over longer ones. It is fitted twice: alone, and with baseline
-    /// friction on every joint until the last fit, since without friction the first optimum for a rig that has it may
-    /// lie anywhere. The better of the two counts. Parameters that the logs do not determine stay near the declared
-    /// values. A model that diverges with its declared values is fitted from other values around them.
+    /// which even a poor start does not diverge, then over longer ones. It is fitted twice: alone, and from the
+    /// [first optimum](Problem::first). The better of the two counts. Parameters that the logs do not determine stay
+    /// near the declared values. A model that diverges with its declared values is fitted from other values around them.
     ///
     /// # Errors
     /// No window, or a model that diverges even over short windows, from all starting values.
     pub fn fit_declared(&self) -> Result<Declared<'a>, StudyError> {
-        let friction = baseline_friction(self);
         if self.error_model == ErrorModel::InverseDynamics {
-            return Ok(self.fitted_by_torques(&friction)?);
+            return Ok(self.fitted_by_torques(&baseline_friction(self))?);
         }
-        let (moved_to, found) = match self.fitted_from(self.declared, &friction) {
+        let problem = match self.first {
+            Some(_) => self.clone(),
+            None => self.with_first_optimum(),
+        };
+        let (moved_to, found) = match problem.fitted_from(self.declared, problem.first.as_deref()) {
             Err(FitError::Diverged { diverged, windows }) => {
-                let (start, found) = self
-                    .fitted_around(&friction)
+                let (start, found) = problem
+                    .fitted_around()
                     .ok_or(FitError::Diverged { diverged, windows })?;
                 let mut moved_to = start.parameters;
                 moved_to.retain(|parameter| !parameter.fixed);
@@ -83,9 +91,39 @@ impl<'a> Problem<'a> {
         let (fitted, identifiability) = found;
         let problem = Self {
             moved_to,
-            ..self.knowing(identifiability)
+            ..problem.knowing(identifiability)
         };
         Ok(Declared { problem, fitted })
+    }
+
+    /// The same problem with its first optimum, in steps in which the friction found there brings each joint to rest as
+    /// it should. Without one if the model diverges or most rigs have nothing that the file lacks.
+    pub(super) fn with_first_optimum(&self) -> Self {
+        let found = self.near_first_optimum(self.declared);
+        let step_s = found.first.as_ref().map(|first| found.stable_step_s(first));
+        match step_s.filter(|step_s| *step_s < found.shooting.longest_s()) {
+            Some(step_s) => {
+                let shooting = found.shooting.clone().in_steps_of(step_s);
+                found.over(shooting).near_first_optimum(self.declared)
+            }
+            None => found,
+        }
+    }
+
+    fn near_first_optimum(&self, start: &Model) -> Self {
+        let forces = usual_forces(self);
+        let is_motion = self.error_model == ErrorModel::OutputError && !forces.is_empty();
+        let first = is_motion.then(|| self.fitted_beside(start, &forces).ok());
+        Self {
+            first: first.flatten().map(Arc::new),
+            ..self.clone()
+        }
+    }
+
+    /// The longest step that a fitted model's friction allows.
+    fn stable_step_s(&self, fitted: &Fitted) -> f64 {
+        let stable_s = longest_stable_step(&self.shooting, &self.compiled(&fitted.model));
+        stable_s.max(self.settings.fit.shortest_step_s)
     }
 
     /// The declared model, fitted to torques, in which it is so nearly linear that no start is poor. The residual of
@@ -130,24 +168,30 @@ impl<'a> Problem<'a> {
     }
 
     /// The best of a few fits that begin at values around the declared ones, and where it began.
-    fn fitted_around(&self, friction: &[FittedEffect]) -> Option<(Model, ByMotion)> {
-        let fit = |start: Model| Some((self.fitted_from(&start, friction).ok()?, start));
+    fn fitted_around(&self) -> Option<(Model, ByMotion)> {
+        let fit = |start: Model| {
+            let first = self.near_first_optimum(&start).first;
+            Some((self.fitted_from(&start, first.as_deref()).ok()?, start))
+        };
         let found = around(self).filter_map(fit);
         let found = found.take(self.settings.fit.fitted_starts);
         let (found, start) = found.min_by(|(a, _), (b, _)| cost(a).total_cmp(&cost(b)))?;
         Some((start, found))
     }
 
-    /// The declared model, fitted from these values, alone and together with friction.
-    fn fitted_from(&self, start: &Model, friction: &[FittedEffect]) -> Result<ByMotion, FitError> {
-        let found = self.declared_beside(start, &[]);
-        if friction.is_empty() {
-            return found;
-        }
-        match (found, self.declared_beside(start, friction)) {
-            (Ok(alone), Ok(beside)) if cost(&alone) <= cost(&beside) => Ok(alone),
-            (_, Ok(beside)) => Ok(beside),
-            (found, Err(_)) => found,
+    /// The declared model, fitted from these values and from a first optimum.
+    fn fitted_from(&self, start: &Model, first: Option<&Fitted>) -> Result<ByMotion, FitError> {
+        let alone = self.fitted_beside(start, &[]).map(|alone| {
+            let identifiability = self.identifiability_of(&alone);
+            (alone, identifiability)
+        });
+        let Some(first) = first else {
+            return alone;
+        };
+        match (alone, self.declared_after(first)) {
+            (Ok(alone), Ok(after)) if cost(&alone) <= cost(&after) => Ok(alone),
+            (_, Ok(after)) => Ok(after),
+            (alone, Err(_)) => alone,
         }
     }
 
@@ -172,21 +216,11 @@ impl<'a> Problem<'a> {
         self.fitted_over(&self.shooting, &first.model)
     }
 
-    /// The declared model, fitted from these values with some effects and then alone, and what the logs determine of it
-    /// together with them.
-    fn declared_beside(
-        &self,
-        start: &Model,
-        effects: &[FittedEffect],
-    ) -> Result<ByMotion, FitError> {
-        let fitted = self.fitted_beside(start, effects)?;
-        let identifiability = self.identifiability_of(&fitted);
-        if effects.is_empty() {
-            return Ok((fitted, identifiability));
-        }
-        let own = fitted.model.effects[..self.declared.effects.len()].to_vec();
-        let alone = self.fitted_over(&self.shooting, &fitted.model.with_effects(own))?;
-        Ok((alone, identifiability))
+    /// The declared model, fitted alone from the values of a first optimum, and what the logs determine of it there.
+    fn declared_after(&self, first: &Fitted) -> Result<ByMotion, FitError> {
+        let own = first.model.effects[..self.declared.effects.len()].to_vec();
+        let alone = self.fitted_over(&self.shooting, &first.model.with_effects(own))?;
+        Ok((alone, self.identifiability_of(first)))
     }
 
     /// The declared model, fitted over short windows only, in which even a poor start does not diverge, from the

@@ -18,6 +18,7 @@ mod external_force;
 mod fit;
 mod fitted;
 mod gravity;
+mod imposed;
 mod judge;
 mod learn;
 mod loss;

@@ -95,8 +95,11 @@ pub fn find<'a>(
         best = other;
         left = best.diagnose(rng);
     }
-    if let Some(plainer) = best.plainer(apart, watch) {
-        best = plainer;
+    let mut is_plainer = false;
+    while let Some(plainer) = best.plainer(apart, watch) {
+        (best, is_plainer) = (plainer, true);
+    }
+    if is_plainer {
         left = best.diagnose(rng);
     }
     Ok(judge(best.declared, best.chosen, left, apart, rng))
@@ -151,14 +154,14 @@ impl<'a> Searched<'a> {
         let Plainer {
             fitted: plain,
             reason,
-        } = plainer(problem, fitted, &self.chosen.after, apart)?;
+        } = plainer(problem, fitted, &self.chosen, apart)?;
         let selected = Selected {
             chosen: Ok(Trial::of(problem, plain)),
             rounds: self.chosen.rounds.clone(),
             stopped: self.chosen.stopped,
         };
         let chosen = Chosen {
-            replaced: Some(reason),
+            replaced: [self.chosen.replaced.as_slice(), &[reason]].concat(),
             ..establish(problem, fitted, selected, watch)
         };
         let declared = self.declared.clone();

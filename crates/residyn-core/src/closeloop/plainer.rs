@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 
 use super::error_model::ErrorModel;
+use super::establish::Chosen;
 use super::fitted::Fitted;
 use super::problem::Problem;
 use crate::data::Log;
 use crate::identify::Values;
-use crate::sim::FIT_S;
 use crate::sim::metric::{errors_in, windows};
 
 /// Most groups of logs that are left out in turn.
@@ -20,38 +20,65 @@ pub(super) struct Plainer {
     pub reason: String,
 }
 
-/// The model with the usual friction, or the declared one, if it predicts whole logs better than the chosen one: those
-/// left out of a fit of the others in turn, and those set `apart`, to which nothing is fitted. The search compares
-/// short windows of logs that it knows.
+/// The model without one of the chosen effects, the model with the usual friction, or the declared one, if it predicts
+/// whole logs better than the chosen one: those left out of a fit of the others in turn, and those set `apart`, to which
+/// nothing is fitted. The search compares short windows of logs that it knows.
 pub(super) fn plainer(
     problem: &Problem<'_>,
     declared: &Fitted,
-    chosen: &Fitted,
+    chosen: &Chosen,
     apart: &[Log],
 ) -> Option<Plainer> {
-    if problem.added(&chosen.model).is_empty() {
+    let after = &chosen.after;
+    if problem.added(&after.model).is_empty() {
         return None;
     }
+    let least = LeftOut::of(problem, after, apart);
     let usual = problem.with_usual_friction();
-    let usual = usual.filter(|usual| !has_same_effects(usual, chosen));
-    let others = usual.iter().map(|usual| (usual, "with the usual friction"));
-    let others = others.chain([(declared, "as declared")]);
-    let models = others.map(|(model, name)| (model, name, LeftOut::of(problem, model, apart)));
-    let mut best: Option<(&Fitted, &str, f64)> = None;
-    let mut least = LeftOut::of(problem, chosen, apart);
-    for (model, name, left) in models.collect::<Vec<_>>() {
-        if let Some(gain) = left.gain_over(&least, problem.settings.select.plainer_gain) {
-            (best, least) = (Some((model, name, gain)), left);
-        }
-    }
-    best.map(|(model, name, gain)| Plainer {
-        fitted: model.clone(),
+    let usual = usual.filter(|usual| !has_same_effects(usual, after));
+    let all = "the effects that the search found are";
+    let others =
+        (usual.iter()).map(|usual| Other::new(usual, all, "of the model with the usual friction"));
+    let others = others.chain([Other::new(declared, all, "of the declared model")]);
+    let without = chosen.standings.iter().filter_map(|standing| {
+        let without = standing.without.as_ref().ok()?;
+        // Most effects help on the logs set apart, which takes no refit to see.
+        let less = (!apart.is_empty()).then(|| log_error(&squares(problem, without, apart)));
+        let unused = format!("{} is", standing.effect.label());
+        (less <= least.apart).then(|| Other::new(without, unused, "without it"))
+    });
+    let others: Vec<Other<'_>> = others.chain(without).collect();
+    let gain = |other: &Other<'_>| {
+        let left = LeftOut::of(problem, other.fitted, apart);
+        left.gain_over(&least, problem.settings.select.plainer_gain)
+    };
+    let gains: Vec<Option<f64>> = others.par_iter().map(gain).collect();
+    let better = others.iter().zip(gains);
+    let better = better.filter_map(|(other, gain)| Some((other, gain?)));
+    let (best, gain) = better.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    Some(Plainer {
+        fitted: best.fitted.clone(),
         reason: format!(
-            "the effects that the search found are not used: on whole logs that the fit had not seen, the error of the \
-             model {name} is lower by {:.0} %",
+            "{} not used: on whole logs that the fit had not seen, the error {} is lower by {:.0} %",
+            best.unused,
+            best.of,
             100.0 * (1.0 - (-gain).exp())
         ),
     })
+}
+
+/// A plainer model than the chosen one, and how a sentence names what it does not use, and its error.
+struct Other<'a> {
+    fitted: &'a Fitted,
+    unused: String,
+    of: &'static str,
+}
+
+impl<'a> Other<'a> {
+    fn new(fitted: &'a Fitted, unused: impl Into<String>, of: &'static str) -> Self {
+        let unused = unused.into();
+        Self { fitted, unused, of }
+    }
 }
 
 fn has_same_effects(a: &Fitted, b: &Fitted) -> bool {
@@ -146,7 +173,7 @@ fn squares(problem: &Problem<'_>, fitted: &Fitted, logs: &[Log]) -> Vec<f64> {
     let at = |horizon_s: &f64| {
         let of_log = |(k, log): (usize, &Log)| windows(k, log, *horizon_s);
         let windows: Vec<_> = logs.iter().enumerate().flat_map(of_log).collect();
-        let errors = errors_in(&dynamics, logs, &windows, FIT_S);
+        let errors = errors_in(&dynamics, logs, &windows, problem.shooting.longest_s());
         errors.iter().flat_map(|error| &error.position).sum()
     };
     problem.settings.score.horizons_s.iter().map(at).collect()

@@ -39,6 +39,9 @@ pub struct Problem<'a> {
     pub shooting: Shooting<'a>,
     /// A few of its windows, spread evenly, for comparing starting points.
     pub sample: Sample<'a>,
+    /// The first optimum: the declared model with the friction and a constant torque of every joint. On a rig that has
+    /// them, the optimum of a model without them may lie anywhere.
+    pub first: Option<Arc<Fitted>>,
     /// The free declared parameters at the starting values of their fit, if the model diverges at the values in its
     /// file; else empty.
     pub moved_to: Vec<Parameter>,
@@ -137,6 +140,7 @@ impl<'a> Problem<'a> {
             top_speed,
             top_torque,
             top_driving,
+            first: None,
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
             held: Vec::new(),
@@ -176,6 +180,7 @@ impl<'a> Problem<'a> {
         let noise = &self.shooting.noise;
         let shooting =
             (self.error_model).shooting(logs, windows, noise, &self.smoothing_velocities);
+        let shooting = shooting.in_steps_of(self.shooting.longest_s());
         let same: &Problem<'b> = self;
         Problem {
             logs,
@@ -192,6 +197,7 @@ impl<'a> Problem<'a> {
         Self {
             sample: Sample::of(&shooting, self.settings.fit.sample_windows),
             shooting,
+            first: None,
             ..self.clone()
         }
     }
@@ -209,6 +215,7 @@ impl<'a> Problem<'a> {
     pub(super) fn with_smoothing_velocities(&self, smoothing_velocities: Vec<f64>) -> Self {
         Self {
             smoothing_velocities,
+            first: None,
             ..self.clone()
         }
     }

@@ -84,6 +84,7 @@ impl<'a> Problem<'a> {
     /// to them.
     pub fn refined(&self) -> Self {
         let settings = &self.settings.refine;
+        let longest_s = self.shooting.longest_s();
         let (step_s, narrower) = (settings.step_s, settings.smoothing_velocity_factor);
         let given = self.declared.smoothing_velocity.as_ref();
         let narrower = given.map_or(narrower, |_| 1.0);
@@ -98,7 +99,10 @@ impl<'a> Problem<'a> {
         Self {
             smoothing_velocities,
             held: self.identifiability.hold.clone(),
-            shooting: self.shooting.clone().in_steps_of(step_s),
+            shooting: self
+                .shooting
+                .clone()
+                .in_steps_of(step_s.min(narrower * longest_s)),
             ..self.clone()
         }
     }

@@ -95,6 +95,10 @@ settings! {
         /// at this speed, a milliradian in half a second on a lab rig. As a share, the width means the same on a slow
         /// axis and on a fast arm.
         smoothing_velocity_share: f64 = 5e-4,
+        /// If dry friction brings a joint to rest faster than the usual steps of the integrator can follow, they are
+        /// made shorter, down to this in s: a fifth of the steps of the final estimate. In steps that are too long a
+        /// joint at rest chatters.
+        shortest_step_s: f64 = 1e-4,
         /// These shares of a joint's top speed are tried as wider smoothing velocities of dry friction: with the
         /// baseline friction if torques are compared, which are smoothed like the motion, and with the chosen effects
         /// if the motion is, since friction on some rigs reverses over such widths.
@@ -102,6 +106,12 @@ settings! {
         /// Torques are compared instead of the motion if the unexplained share of the motion is at least this many
         /// times that of the torques. Arms under stiff position control are at 34 and more, pendulums below 1.
         motion_over_torque: f64 = 10.0,
+        /// If a motion is imposed on the rig, it explains the torques: the declared model with the usual forces leaves
+        /// less than this share of their standard deviation, a tenth of their variance.
+        imposed_torque_share: f64 = 0.316,
+        /// A motion is imposed if the torques leave, of its distance from a uniform motion, more than this many times
+        /// the share that it leaves of the torques. On a rig moved by its torques they leave a tenth of that.
+        imposed_motion: f64 = 2.0,
         /// Up to this many joints, the errors of the motion are examined to choose between motion and torques; with
         /// more joints, a fit of the motion takes minutes before any search begins, and torques are compared.
         most_joints_by_motion: usize = 3,

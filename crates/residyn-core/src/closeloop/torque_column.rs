@@ -5,12 +5,11 @@ use rayon::prelude::*;
 use super::error_model::ErrorModel;
 use super::prepare::{Prepared, ReadyLogs};
 use super::problem::Problem;
-use super::select::baseline_sets;
+use super::select::usual_forces;
 use crate::data::statistics::mean;
 use crate::data::torque_column::share_of_held;
 use crate::data::{Finding, Log, Quantity, Severity, TorqueColumn};
 use crate::identify::fit_torques;
-use crate::model::FittedEffect;
 
 /// The torques of all logs are of one kind, and this many logs suffice to show which.
 const FEW: usize = 3;
@@ -91,20 +90,14 @@ impl Problem<'_> {
 
     /// What the declared model with the usual friction and a constant torque leaves of the motion; `None` if it diverges.
     fn motion_noise(&self) -> Option<f64> {
-        let fitted = self.fitted_beside(&self.started_from(), &self.usual_forces());
+        let fitted = self.fitted_beside(&self.started_from(), &usual_forces(self));
         Some(fitted.ok()?.fit.scale)
-    }
-
-    /// The usual friction and a constant torque: without them, torques of another kind may explain what they do.
-    fn usual_forces(&self) -> Vec<FittedEffect> {
-        let sets = baseline_sets(self).into_iter();
-        sets.take(2).next_back().unwrap_or_default()
     }
 
     /// What the same model leaves of the torques: the geometric mean over the joints. `None` if
     /// it gives accelerations, or diverges.
     fn torque_noise(&self) -> Option<f64> {
-        let effects = [self.declared.effects.as_slice(), &self.usual_forces()].concat();
+        let effects = [self.declared.effects.as_slice(), &usual_forces(self)].concat();
         let model = self.smoothed(&self.declared.with_effects(effects));
         let found = fit_torques(self.solver, &model, self.declared, self.logs).ok()?;
         let noise = found.shooting.noise.iter().map(|noise| noise.ln());

@@ -1,9 +1,11 @@
 use super::diagnostics::{UNKNOWN, Unexplained};
+use super::error_model::ErrorModel;
 use super::gravity::against_gravity;
 use super::judge::Found;
 use super::problem::Problem;
 use super::refine::Refined;
 use super::score::Errors;
+use crate::digits::amount_of;
 use crate::identify::Identifiability;
 use schemars::JsonSchema;
 
@@ -30,12 +32,12 @@ pub(super) fn verdict(
     errors: &Errors,
 ) -> (Verdict, String) {
     let (verdict, reason) = concluded(found, refined, errors);
-    let replaced = found.chosen.replaced.iter();
-    let reasons: Vec<&str> = [reason.as_str()]
+    let far = far_from_declared(&found.problem, refined);
+    let reasons = far
         .into_iter()
-        .chain(replaced.map(String::as_str))
-        .collect();
-    (verdict, reasons.join("; "))
+        .chain([reason])
+        .chain(found.chosen.replaced.clone());
+    (verdict, reasons.collect::<Vec<_>>().join("; "))
 }
 
 fn concluded(found: &Found<'_>, refined: &Refined<'_>, errors: &Errors) -> (Verdict, String) {
@@ -47,7 +49,7 @@ fn concluded(found: &Found<'_>, refined: &Refined<'_>, errors: &Errors) -> (Verd
     match at_rest(problem)
         .or_else(|| failure(found, refined))
         .or_else(|| against_gravity(&found.gravity, &problem.settings.notes))
-        .or_else(|| inconclusive(problem, &refined.identifiability))
+        .or_else(|| inconclusive(problem, &refined.identifiability, established))
     {
         Some(reason) => (Verdict::Inconclusive, reason),
         None if added > 0 && are_worse => contradicted(established, &found.unexplained),
@@ -87,8 +89,35 @@ fn failure(found: &Found<'_>, refined: &Refined<'_>) -> Option<String> {
     (!fit.termination.has_converged()).then(|| format!("the final fit has {}", fit.termination))
 }
 
-/// Why the logs allow no conclusion, if they do not.
-fn inconclusive(problem: &Problem<'_>, known: &Identifiability) -> Option<String> {
+/// Values that the fit moves by more than this factor are not what the file means: a motion that says nothing of them,
+/// another unit.
+const FAR: f64 = 100.0;
+
+/// The declared parameters that are fitted far from their declared values, as a reason to distrust the answer.
+fn far_from_declared(problem: &Problem<'_>, refined: &Refined<'_>) -> Option<String> {
+    let declared = problem.declared.parameters.iter();
+    let far = declared
+        .zip(&refined.after.model.parameters)
+        .filter(|(declared, fitted)| {
+            let ratio = (fitted.value / declared.value).abs();
+            !declared.fixed && declared.value != 0.0 && !(1.0 / FAR..FAR).contains(&ratio)
+        });
+    let far: Vec<String> = far
+        .map(|(declared, fitted)| {
+            let [was, is] = [declared, fitted].map(|of| amount_of(of.value, None, &of.unit));
+            format!("{} is fitted at {is}, declared as {was}", fitted.name)
+        })
+        .collect();
+    (!far.is_empty()).then(|| format!("{}: do not use this model", far.join(", ")))
+}
+
+/// Why the logs allow no conclusion, if they do not. Torques may establish a force although they say nothing of the
+/// declared parameters.
+fn inconclusive(
+    problem: &Problem<'_>,
+    known: &Identifiability,
+    established: usize,
+) -> Option<String> {
     let settings = &problem.settings.verdict;
     let windows = problem.shooting.windows.len();
     if windows < settings.fewest_windows {
@@ -97,7 +126,8 @@ fn inconclusive(problem: &Problem<'_>, known: &Identifiability) -> Option<String
             problem.settings.fit.window_s
         ));
     }
-    (known.free > 0 && known.determined == 0).then(|| {
+    let tells_of_forces = problem.error_model == ErrorModel::InverseDynamics && established > 0;
+    (known.free > 0 && known.determined == 0 && !tells_of_forces).then(|| {
         "the training logs determine none of the declared model's parameters; move the joints more"
             .into()
     })

@@ -13,6 +13,9 @@ pub struct LevenbergMarquardt {
     pub enough_to_compare: f64,
     /// The same for choosing among sets of effects, which differ by more than this.
     pub enough_to_choose: f64,
+    /// Where no step lowers the cost, a fit has converged if the quadratic model predicts a decrease below this as well:
+    /// it would move no combination of the values by a fifth of its standard error.
+    pub negligible: f64,
     /// Damping of the first step, as a share of the diagonal of the normal equations.
     pub first_damping: f64,
     /// The factor by which damping changes with each step that lowers the cost.
@@ -35,6 +38,7 @@ impl LevenbergMarquardt {
         enough_to_estimate: 1e-6,
         enough_to_compare: 1e-4,
         enough_to_choose: 1e-3,
+        negligible: 0.02,
         first_damping: 1e-3,
         damping_on_success: 0.1,
         damping_on_failure: 10.0,
@@ -102,7 +106,7 @@ impl LevenbergMarquardt {
     fn predicts_enough(&self, search: &Search<'_>, near: &Linearised) -> bool {
         let predicted = search.predicted_decrease(near, self.first_damping);
         let enough = self.enough(search.purpose()) * search.cost().max(1.0);
-        predicted.is_none_or(|decrease| decrease > enough)
+        predicted.is_none_or(|decrease| decrease > enough.max(self.negligible))
     }
 
     /// Whether the quadratic model of the cost, hardly damped, leads nowhere near a useful cost.

@@ -10,7 +10,7 @@ use super::sensitivity::{LANES, Local, Tangent};
 use super::values::{Column, Values};
 use crate::data::{Log, half_width_s};
 use crate::model::{Dynamics, Model};
-use crate::sim::{Commands, Point, Window, cut, initial_state};
+use crate::sim::{Commands, FIT_S, Point, Window, cut, initial_state};
 
 /// Least squares over windows of logs.
 ///
@@ -25,6 +25,8 @@ pub struct Shooting<'l> {
     pub windows: Vec<Window>,
     /// Standard deviation per joint: of the position noise in rad (or m), or of the torque in N m (or N).
     pub noise: Vec<f64>,
+    /// The longest step of the integrator, in s.
+    longest_s: f64,
     measure: Measure,
     prior: Prior,
     /// The same logs cut into windows of other lengths, for each length requested so far: shared by all copies.
@@ -68,6 +70,7 @@ impl<'l> Shooting<'l> {
             logs,
             windows,
             noise: noise.to_vec(),
+            longest_s: FIT_S,
             measure,
             prior: Prior::default(),
             cuts: Arc::default(),
@@ -144,7 +147,10 @@ impl<'l> Shooting<'l> {
             }
         };
         other.prior = self.prior.clone();
-        other
+        match self.longest_s == FIT_S {
+            true => other,
+            false => other.in_steps_of(self.longest_s),
+        }
     }
 
     /// What is free in each window, judged by these values.
@@ -203,9 +209,15 @@ impl<'l> Shooting<'l> {
         residuals as f64 / self.windows.len().max(1) as f64
     }
 
+    /// The longest step of the integrator, in s.
+    pub fn longest_s(&self) -> f64 {
+        self.longest_s
+    }
+
     /// The same windows, integrated in substeps of at most `longest_s`.
     #[must_use]
     pub fn in_steps_of(mut self, longest_s: f64) -> Self {
+        (self.longest_s, self.cuts) = (longest_s, Arc::default());
         if let Measure::Motion(packs) = &mut self.measure {
             let packs = Arc::make_mut(packs).iter_mut();
             packs.for_each(|pack| pack.cut(longest_s));

@@ -73,7 +73,7 @@ fn compared(report: &Report) -> String {
         }
         ErrorModel::InverseDynamics => {
             "Models are fitted to, selected and compared by the torques that the logged motion needs: a controller \
-             prescribes this motion, so half a second of open-loop integration under the logged torques says little. \
+             or a bench prescribes this motion, so half a second of open-loop integration under the logged torques says little. \
              Values and names hold for motions like these; a good fit says nothing about what no log moves, holds or \
              loads."
                 .to_owned()

@@ -9,6 +9,7 @@ const REMARKS: usize = 2;
 
 pub(super) fn lines(report: &Report) -> Vec<String> {
     let remarks = [
+        at_bounds(report),
         harmful(report),
         calibrated(report),
         held(report),
@@ -24,6 +25,24 @@ pub(super) fn lines(report: &Report) -> Vec<String> {
         .flatten()
         .chain(remarks)
         .collect()
+}
+
+/// Declared parameters that the fit moved to a bound of their range.
+fn at_bounds(report: &Report) -> Option<String> {
+    let bound = report
+        .parameters
+        .iter()
+        .map(|of| &of.fitted)
+        .filter(|of| of.at_bound);
+    let bound: Vec<String> = bound
+        .map(|of| format!("{} = {}", of.name, of.value))
+        .collect();
+    (!bound.is_empty()).then(|| {
+        format!(
+            "at the bound of its range, where no fit should end: {}; is a sign wrong, or a unit?",
+            bound.join(", ")
+        )
+    })
 }
 
 /// Effects that the training logs establish, but that raise the error on the test logs by more than a percent.

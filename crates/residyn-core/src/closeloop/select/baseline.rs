@@ -3,10 +3,29 @@ use crate::model::{Effect, FittedEffect};
 
 use super::candidate::acting;
 
+impl Problem<'_> {
+    /// These effects, each at its values in the first optimum, if it has it.
+    pub(super) fn at_first_optimum(&self, effects: Vec<FittedEffect>) -> Vec<FittedEffect> {
+        let known = self.first.as_ref().map(|first| &first.model.effects);
+        let found = |effect: FittedEffect| {
+            let same = known.and_then(|known| known.iter().find(|known| known.is_same(&effect)));
+            same.cloned().unwrap_or(effect)
+        };
+        effects.into_iter().map(found).collect()
+    }
+}
+
 /// The smallest baseline set: the friction of every joint, unless the model file has it.
 pub fn baseline_friction(problem: &Problem<'_>) -> Vec<FittedEffect> {
     let mut sets = baseline_sets(problem).into_iter();
     sets.next().unwrap_or_default()
+}
+
+/// The friction and a constant torque of every joint, as far as the model file has none: a model without them may explain
+/// what they do by values that are far off.
+pub fn usual_forces(problem: &Problem<'_>) -> Vec<FittedEffect> {
+    let sets = baseline_sets(problem).into_iter();
+    sets.take(2).next_back().unwrap_or_default()
 }
 
 /// The baseline sets, which most machines have, each on all joints together: if every joint has friction, adding it to

@@ -7,7 +7,6 @@ use crate::closeloop::settings::SelectSettings;
 use crate::data::statistics::{mean, standard_error};
 use crate::identify::{Values, Window};
 use crate::model::Dynamics;
-use crate::sim::FIT_S;
 use crate::sim::metric::{errors_in, windows};
 
 /// The error of a set of effects, as reported, on blocks left out of the fit: squares of the open-loop motion in rad^2
@@ -49,7 +48,12 @@ fn of_motion(problem: &Problem<'_>, folds: &Folds, trial: &Trial) -> Vec<f64> {
             if own.is_empty() {
                 return Vec::new();
             }
-            let errors = errors_in(&model, &problem.logs[log..=log], &own, FIT_S);
+            let errors = errors_in(
+                &model,
+                &problem.logs[log..=log],
+                &own,
+                problem.shooting.longest_s(),
+            );
             let squares = errors.iter().map(|error| error.position.iter().sum());
             blocks.into_iter().zip(squares).collect()
         };

@@ -223,8 +223,10 @@ impl<'a> Search<'a> {
         let step = problem.settings.select.round_gain;
         let best = self.better(&declared, step, |search, declared| {
             search.say("fitting baseline friction");
-            let baseline = baseline_sets(problem);
-            let fitted = search.fitted_for_the_best(declared, baseline);
+            let start = declared.moved_to_first_optimum(problem);
+            let baseline = baseline_sets(problem).into_iter();
+            let baseline = baseline.map(|set| problem.at_first_optimum(set)).collect();
+            let fitted = search.fitted_for_the_best(&start, baseline);
             search.noted(declared, fitted, 0)
         });
         let best = best.map(|best| self.choose(best));

@@ -31,6 +31,21 @@ impl Trial {
         }
     }
 
+    /// The same trial as a start for fits with more effects: at the values of the first optimum, if there is one.
+    pub(super) fn moved_to_first_optimum(&self, problem: &Problem<'_>) -> Self {
+        let Some(first) = &problem.first else {
+            return self.clone();
+        };
+        let own = first.model.effects[..problem.declared.effects.len()].to_vec();
+        let mut fit = self.fitted.fit.clone();
+        fit.start_states.clone_from(&first.fit.start_states);
+        let model = first.model.with_effects(own);
+        Self {
+            fitted: Fitted { model, fit },
+            ..self.clone()
+        }
+    }
+
     /// Loss over all blocks.
     pub fn loss(&self) -> f64 {
         self.losses.total()

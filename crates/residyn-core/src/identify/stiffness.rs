@@ -1,0 +1,46 @@
+//! How fast dry friction brings a joint to rest. In steps that are too long for it, a joint that rests chatters, and
+//! the cost of a fit jumps from one value of a parameter to the next.
+
+use super::sensitivity::{LANES, Local, Tangent};
+use super::shooting::Shooting;
+use super::values::Values;
+use crate::lanes::Row;
+use crate::model::Dynamics;
+use crate::sim::{RK4, Window};
+
+/// Of the longest step at which the scheme still follows a decay, this share is used: bodies move, and their inertia
+/// with them.
+const STABLE_SHARE: f64 = 0.7;
+
+/// The longest step in s at which every joint of a model comes to rest as it should, at the places where the windows
+/// begin; infinite without friction.
+pub fn longest_stable_step(shooting: &Shooting<'_>, dynamics: &Dynamics) -> f64 {
+    let values = Values::of(dynamics, shooting.logs);
+    let tangent = Tangent::new(dynamics, &[], Local::State);
+    let of_some = |windows: &[Window]| fastest_decay(shooting, &tangent, &values, windows);
+    let fastest = shooting.windows.chunks(LANES).map(of_some);
+    STABLE_SHARE * RK4.most_damping / fastest.fold(0.0, f64::max)
+}
+
+/// The largest sum of the rates (1/s) at which the joints' velocities decay at standstill: no eigenvalue of the friction
+/// exceeds it.
+fn fastest_decay(
+    shooting: &Shooting<'_>,
+    tangent: &Tangent,
+    values: &Values,
+    windows: &[Window],
+) -> f64 {
+    let n = tangent.joints;
+    let mut tape = (tangent.program).tape_at::<f64, LANES>(tangent.first_parameter, &values.common);
+    let at = |lane: usize| &windows[lane.min(windows.len() - 1)];
+    let inputs = tape.moving();
+    for joint in 0..n {
+        inputs[joint] = Row::from_fn(|lane| shooting.logs[at(lane).log].q[joint][at(lane).first]);
+        let tau = |lane: usize| shooting.logs[at(lane).log].held(joint, at(lane).first);
+        inputs[2 * n + joint] = Row::from_fn(tau);
+    }
+    tape.run();
+    let decay = |joint: usize, lane: usize| -tape.output(n + (2 * n + 1) * joint + n)[lane];
+    let all = |lane: usize| -> f64 { (0..n).map(|joint| decay(joint, lane).max(0.0)).sum() };
+    (0..LANES).map(all).fold(0.0, f64::max)
+}
