@@ -62,6 +62,10 @@ pub(super) struct Arguments {
     /// whichever say more about these logs
     #[arg(long, value_enum)]
     errors: Option<Errors>,
+    /// Horizons of the errors in s; models are fitted over windows of the middle one, and compared there. Without it
+    /// 0.1, 0.5 and 1 s or, for the free motion of a joint without a drive, up to several swings
+    #[arg(long, num_args = 1.., value_name = "S", value_parser = inputs::horizon)]
+    horizon: Vec<f64>,
     /// Draw curves of the error below the answer, as is done on a terminal that shows UTF-8
     #[arg(long)]
     curves: bool,
@@ -119,6 +123,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     request.against = against;
     request.learner = Some(&learner);
     request.error_model = arguments.errors.map(ErrorModel::from);
+    request.horizons_s = Some(arguments.horizon.clone()).filter(|given| !given.is_empty());
     let prepared = prepare(request, &stages);
     stages.beside(|| inputs::print_faults(prepared.audits()));
     let mut outcome = solve(&prepared, &mut rng, &stages)?;

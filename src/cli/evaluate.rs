@@ -29,7 +29,7 @@ pub(super) struct Arguments {
     #[arg(long, num_args = 1.., required = true, value_name = "LOG")]
     test: Vec<PathBuf>,
     /// Horizons in s
-    #[arg(long, num_args = 1.., default_values_t = [0.1, 0.5, 1.0], value_name = "S")]
+    #[arg(long, num_args = 1.., default_values_t = [0.1, 0.5, 1.0], value_name = "S", value_parser = inputs::horizon)]
     horizon: Vec<f64>,
     /// Compare the torques that the logged motion needs with the logged ones as well
     #[arg(long, conflicts_with = "checkpoint")]
@@ -68,13 +68,6 @@ struct LogEntry {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    if let Some(bad) = arguments
-        .horizon
-        .iter()
-        .find(|h| !(**h > 0.0 && h.is_finite()))
-    {
-        bail!("--horizon {bad}: a horizon is a number of seconds above zero");
-    }
     let (declared, dynamics) = model(arguments)?;
     let mut logs = terminal::stage("reading the logs", || read_logs(&arguments.test, &declared))?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;

@@ -59,6 +59,15 @@ pub(super) fn count(text: &str) -> Result<NonZeroUsize, String> {
     .ok_or_else(|| format!("write a whole number from 1 to {RUNS}"))
 }
 
+/// A horizon of errors in s.
+pub(super) fn horizon(text: &str) -> Result<f64, String> {
+    let horizon_s = text
+        .parse()
+        .ok()
+        .filter(|of: &f64| *of > 0.0 && of.is_finite());
+    horizon_s.ok_or_else(|| "a horizon is a number of seconds above zero".to_owned())
+}
+
 /// The source of a model.
 pub(super) enum Source<'a> {
     Checkpoint(&'a Path),

@@ -17,6 +17,7 @@ mod every_log;
 mod external_force;
 mod fit;
 mod fitted;
+mod free_swing;
 mod gravity;
 mod imposed;
 mod judge;

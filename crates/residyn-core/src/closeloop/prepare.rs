@@ -54,7 +54,11 @@ pub struct ReadyLogs {
 pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> {
     watch.see(Stage::Audit.into());
     let split = request.divided();
-    let (model, settings) = (request.model, &mut request.settings);
+    let model = request.model;
+    let mut settings = match request.horizons_s {
+        Some(horizons_s) => request.settings.with_horizons(horizons_s),
+        None => request.settings.over_swings(model, &split.train),
+    };
     let horizons_s = settings.score.horizons_s.drain(..);
     let (scored_s, unscored_s) =
         horizons_s.partition(|horizon_s| window_count(&split.test, *horizon_s) > 0);
@@ -81,7 +85,7 @@ pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> 
         error_model: request.error_model,
         solver: request.solver,
         learner: request.learner,
-        settings: request.settings,
+        settings,
     }
     .with_known_torques()
 }

@@ -18,6 +18,9 @@ pub struct Request<'a> {
     /// Models to score as they are on the same test logs.
     pub against: Vec<Reference>,
     pub settings: Settings,
+    /// Horizons of the errors in s, of which the middle one is the length of the windows that models are fitted over;
+    /// if not given, those of the settings or, for the free motion of a joint, several swings.
+    pub horizons_s: Option<Vec<f64>>,
     /// Which errors to compare; if not given, those that say more about these logs.
     pub error_model: Option<ErrorModel>,
     /// Finds the minimum of each fit.
@@ -63,6 +66,7 @@ impl<'a> Request<'a> {
             logs,
             against: Vec::new(),
             settings: Settings::default(),
+            horizons_s: None,
             error_model: None,
             solver: &LevenbergMarquardt::USUAL,
             learner: None,

@@ -38,6 +38,17 @@ impl ScoreSettings {
     }
 }
 
+impl Settings {
+    /// The same settings with errors at these horizons (s), and fits over windows of the middle one.
+    #[must_use]
+    pub fn with_horizons(mut self, mut horizons_s: Vec<f64>) -> Self {
+        horizons_s.sort_by(f64::total_cmp);
+        self.score.horizons_s = horizons_s;
+        self.fit.window_s = self.score.middle_s();
+        self
+    }
+}
+
 impl SelectSettings {
     /// The largest number of effects in one set, in a model with this many joints.
     pub(super) fn most_effects_of(&self, joints: usize) -> usize {
@@ -89,6 +100,9 @@ settings! {
         short_window_s: f64 = 0.15,
         /// Models are fitted and compared over windows of this length in s: most effects show in them.
         window_s: f64 = 0.5,
+        /// The free motion of a joint that nothing drives is compared over windows of this many swings, as far as the
+        /// logs hold enough of them: light damping takes several swings to show.
+        swings: f64 = 3.0,
         /// The starting points of a candidate are compared on this many windows, spread evenly over the logs.
         sample_windows: usize = 24,
         /// Dry friction is smoothed over this share of a joint's top speed in the logs: a sticking joint creeps at most
