@@ -174,3 +174,78 @@ fn published_models_of_a_double_pendulum_are_scored_as_they_are() {
         }
     }
 }
+
+/// A bench moves the rod of a pneumatic cylinder, and a load cell measures the force: two levels, 7.3 N on either side of
+/// -148.6 N at 3 bar. The motion says nothing of the rod's mass.
+#[test]
+fn the_force_of_an_imposed_motion_is_explained() {
+    let (model, log) = ("cyl.toml", "circle_3bar.csv");
+    let Some(scratch) = with_logs("pneumatic_cylinder", &[model, log]) else {
+        return;
+    };
+    let report = report(&scratch, &format!("--model {model} --train {log}"));
+    assert_eq!(report["compared"], "inverse_dynamics");
+    assert_eq!(report["verdict"], "explained", "{}", report["reason"]);
+    let effects = report["effects"].as_array().unwrap();
+    let force = effects
+        .iter()
+        .find(|effect| effect["name"] == "constant_torque");
+    let force = force.expect("a constant force")["parameters"][0]["value"]
+        .as_f64()
+        .unwrap();
+    assert!((force + 148.6).abs() < 1.0, "{force}");
+    assert!(
+        names(&report)
+            .iter()
+            .any(|name| name.ends_with("_friction")),
+        "{effects:#?}"
+    );
+    let mass = &report["parameters"][0];
+    assert_eq!((&mass["name"], &mass["value"]), (&"m".into(), &0.2.into()));
+    let relative = report["torque"]["after"]["relative"].as_f64().unwrap();
+    assert!(relative < 0.01, "{relative}");
+}
+
+/// A fit of the whole swing is 9 mrad off after 20 s; windows of half a second show no damping, and are 36 mrad off.
+#[test]
+fn light_damping_of_a_filmed_pendulum_is_found_over_several_swings() {
+    let (model, log) = ("pend.toml", "lab1_a.csv");
+    let Some(scratch) = with_logs("filmed_pendulum", &[model, log]) else {
+        return;
+    };
+    let report = report(&scratch, &format!("--model {model} --train {log}"));
+    let error = &report["error"];
+    let horizons = error["horizons_s"].as_array().unwrap();
+    let longest = horizons.len() - 1;
+    assert!(horizons[longest].as_f64().unwrap() > 19.0, "{horizons:?}");
+    let ahead = error["after"]["position_rmse"][longest][0]
+        .as_f64()
+        .unwrap();
+    assert!(ahead < 0.010, "{ahead}");
+    let damped = ["quadratic_drag", "viscous_friction", "asymmetric_friction"];
+    let found = names(&report);
+    assert!(found.iter().any(|name| damped.contains(name)), "{found:?}");
+}
+
+/// A geared joint that rests in half of its rows: its friction is named, and nothing that a joint at rest might hide.
+#[test]
+fn friction_of_a_sticking_joint_is_named_alone() {
+    let (model, plant) = ("joint.toml", "plant.toml");
+    let Some(scratch) = with_logs("sticking_joint", &[model, plant]) else {
+        return;
+    };
+    for seed in 0..3 {
+        scratch.answers(&format!(
+            "simulate --plant {plant} --duration 15 --seed {seed} --out {seed}.csv"
+        ));
+    }
+    let report = report(
+        &scratch,
+        &format!("--model {model} --train 0.csv 1.csv --test 2.csv"),
+    );
+    let mut found = names(&report);
+    found.sort_unstable();
+    assert_eq!(found, ["coulomb_friction", "viscous_friction"]);
+    assert_eq!(report["verdict"], "explained", "{}", report["reason"]);
+    assert_eq!(report["fits"]["after"]["converged"], true);
+}

@@ -46,3 +46,38 @@ fn swing_s(log: &Log) -> Option<f64> {
     let passes = sides.windows(2).filter(|pair| pair[0] != pair[1]).count();
     (passes > 1).then(|| 2.0 * log.duration() / passes as f64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Settings;
+    use crate::closeloop::tests::pendulum;
+    use crate::data::Log;
+
+    /// A minute at 50 Hz of a swing every 2 s, with this torque.
+    fn swing(tau: f64) -> Log {
+        let mut log = Log::empty(1);
+        log.time = (0..3000).map(|row| 0.02 * f64::from(row)).collect();
+        let angle = |t: &f64| 0.3 * (std::f64::consts::PI * t).cos();
+        log.q = vec![log.time.iter().map(angle).collect()];
+        log.qd = vec![vec![0.0; 3000]];
+        log.tau = vec![vec![tau; 3000]];
+        log
+    }
+
+    #[test]
+    fn a_free_motion_is_compared_over_several_swings() {
+        let of = |log: Log| Settings::default().over_swings(&pendulum(), &[log]);
+        let free = of(swing(0.0));
+        // Eight windows and as many for the test need shorter ones than three swings of 2 s.
+        assert_eq!(free.score.horizons_s, [0.1, 0.5, 3.7, 7.4, 14.8]);
+        assert_eq!((free.fit.window_s, free.score.middle_s()), (3.7, 3.7));
+        assert_eq!(of(swing(0.1)), Settings::default());
+    }
+
+    #[test]
+    fn horizons_that_are_given_set_the_windows() {
+        let given = Settings::default().with_horizons(vec![2.0, 0.1, 1.0]);
+        assert_eq!(given.score.horizons_s, [0.1, 1.0, 2.0]);
+        assert_eq!(given.fit.window_s, 1.0);
+    }
+}

@@ -44,3 +44,40 @@ fn fastest_decay(
     let all = |lane: usize| -> f64 { (0..n).map(|joint| decay(joint, lane).max(0.0)).sum() };
     (0..LANES).map(all).fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::longest_stable_step;
+    use crate::data::{Joint, Log};
+    use crate::identify::{Shooting, cut};
+    use crate::model::{FittedEffect, Library};
+
+    /// Friction of 0.4 N m that reverses over 1 mrad/s brings an inertia of 1 kg m^2 to rest at 400/s.
+    #[test]
+    fn steps_follow_how_fast_friction_brings_a_joint_to_rest() {
+        let library = Library::built_in();
+        let friction = library.effect("coulomb_friction").unwrap();
+        let rig = "[system]\nname = \"joint\"\njoints = 1\n[parameters]\nJ = { value = 1 }\n\
+                   [dynamics]\nmass = [[\"J\"]]\nbias = [\"0\"]\n";
+        let rig = library.model_from_text("joint.toml", rig).unwrap();
+        let mut log = Log::empty(1);
+        log.time = (0..100).map(|row| 0.01 * f64::from(row)).collect();
+        let rest = vec![vec![0.0; 100]];
+        (log.q, log.qd, log.tau) = (rest.clone(), rest.clone(), rest);
+        let logs = [log];
+        let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
+        let step_s = |size: f64, width: f64| {
+            let mut effect = FittedEffect::absent(friction, Joint::at(0));
+            effect.values[0].0 = size;
+            let model = rig
+                .with_effects(vec![effect])
+                .with_smoothing_velocities(vec![width]);
+            longest_stable_step(&shooting, &model.dynamics())
+        };
+        let usual = step_s(0.4, 1e-3);
+        assert!((2e-3..1e-2).contains(&usual), "{usual}");
+        assert!((step_s(0.8, 1e-3) / usual - 0.5).abs() < 1e-9);
+        assert!((step_s(0.4, 5e-4) / usual - 0.5).abs() < 1e-9);
+        assert_eq!(step_s(0.0, 1e-3), f64::INFINITY);
+    }
+}
