@@ -6,7 +6,7 @@ use residyn::with_effects_in;
 use residyn_core::data::Joint;
 use residyn_core::expr::{Graph, Program, SignForm};
 use residyn_core::lanes::Row;
-use residyn_core::model::{Dynamics, Effect, Entry, FittedEffect, Library, Model};
+use residyn_core::model::{ActsOn, Dynamics, Effect, Entry, FittedEffect, Library, Model};
 
 pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
@@ -56,7 +56,8 @@ pub fn can_act(system: &Model, effect: &Effect, joint: usize) -> bool {
     let slides = &system.prismatic;
     let alone = joint + 1 == system.joints || slides[joint] != slides[joint + 1];
     !(inertia && !system.has_mass_matrix()
-        || effect.first_joint_only && joint > 0
+        || effect.acts_on == ActsOn::First && joint > 0
+        || effect.acts_on == ActsOn::Turning && slides[joint]
         || effect.is_coupling() && alone
         || matches!(effect.entry, Entry::Payload(_)))
 }

@@ -12,8 +12,10 @@ use super::fitted::Fitted;
 use super::gravity::{against_gravity, shares_of_gravity};
 use super::loss::Loss;
 use super::problem::Problem;
+use super::refine::Refined;
+use super::select::p_value;
 use crate::data::Log;
-use crate::model::{FittedEffect, Status};
+use crate::model::{FittedEffect, Model, Status};
 
 /// What the declared model lacks, judged by the logs.
 pub struct Found<'a> {
@@ -55,7 +57,7 @@ pub(super) fn judge<'a>(
     if against_gravity(&gravity, &problem.settings.notes).is_some() {
         demote(&mut chosen.standings, |_| Some(ANOTHER_GRAVITY.into()));
     }
-    chosen.mark(&problem);
+    mark(&mut chosen.after.model, &chosen.standings);
     if chosen.established() == 0 && !chosen.standings.is_empty() {
         // Effects that are not established explain nothing.
         left = diagnose(&problem, &before, &before, rng);
@@ -119,13 +121,34 @@ impl Chosen {
         });
     }
 
-    /// Record the status of each effect in the model.
-    fn mark(&mut self, problem: &Problem<'_>) {
-        let model = &mut self.after.model;
-        let added = problem.added(model);
-        for (effect, standing) in model.effects[added].iter_mut().zip(&self.standings) {
-            effect.status = Some(standing.status);
+    /// Effects are not established if nothing is left of their evidence in fine steps: what the coarser ones showed was
+    /// their own error.
+    pub(super) fn confirm(&mut self, refined: &mut Refined<'_>) {
+        let (problem, least) = (
+            &refined.problem,
+            refined.problem.settings.establish.uncorrected_false_alarm,
+        );
+        let added = problem.added(&refined.after.model);
+        let p_values = added.map(|k| p_value(problem, &refined.after, k));
+        let p_values: Vec<Option<f64>> = p_values.collect();
+        for (standing, p) in self.standings.iter_mut().zip(p_values) {
+            if let Some(p) = p.filter(|p| *p > least && standing.status == Status::Established) {
+                standing.status = Status::Supported;
+                standing.reason = Some(format!(
+                    "in finer steps its value is not significant (p = {p:.2})"
+                ));
+            }
         }
+        mark(&mut refined.after.model, &self.standings);
+        mark(&mut self.after.model, &self.standings);
+    }
+}
+
+/// Record the status of each added effect in a model.
+fn mark(model: &mut Model, standings: &[Standing]) {
+    let declared = model.effects.len() - standings.len();
+    for (effect, standing) in model.effects[declared..].iter_mut().zip(standings) {
+        effect.status = Some(standing.status);
     }
 }
 

@@ -45,9 +45,10 @@ pub fn solve(
     watch: &dyn Watch,
 ) -> Result<Outcome, StudyError> {
     let declared = fit(prepared, watch)?;
-    let found = find(declared, &prepared.test.for_fits, rng, watch)?;
+    let mut found = find(declared, &prepared.test.for_fits, rng, watch)?;
     let alternatives = discriminate(&found, watch);
-    let refined = refine(&found, watch);
+    let mut refined = refine(&found, watch);
+    found.chosen.confirm(&mut refined);
     let diagnostics = Diagnostics::of(&found, &refined);
     let with_friction = found.problem.with_usual_friction();
     let audits = noted(prepared, &found, with_friction.as_ref(), &diagnostics);

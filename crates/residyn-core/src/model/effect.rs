@@ -33,11 +33,21 @@ pub struct Effect {
     pub confused_with: Vec<String>,
     /// The motion that shows the effect.
     pub shown_by: String,
-    /// Acts only where gravity's direction enters: on the first joint of a chain.
-    pub first_joint_only: bool,
+    pub acts_on: ActsOn,
     /// Most machines have it, on every joint: such effects are tried together before all others, first those of rank 1,
     /// then those up to rank 2, and so on. Effects of rank 1 are also added to a model before its first fit.
     pub baseline: Option<usize>,
+}
+
+/// The joints on which an effect has a meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ActsOn {
+    #[default]
+    All,
+    /// Where gravity's direction enters: the first joint of a chain, if it turns.
+    First,
+    /// Joints that turn: the effect repeats with each turn.
+    Turning,
 }
 
 /// How an effect enters the equations of its joint. Formulas are in `q`, `qd`, `tau`, `load`, `t` of that joint and in

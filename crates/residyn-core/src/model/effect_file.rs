@@ -7,7 +7,7 @@ use super::effect::{Effect, EffectParameter, Entry, Measure};
 use super::reader::{Document, FileError, Located, Section};
 use super::sections;
 use super::tables::{EffectFile, EffectParameterTable, EffectTable};
-use super::values::{ActsOn, Named};
+use super::values::Named;
 use crate::expr::Formula;
 
 const ONE_WAY: &str =
@@ -46,7 +46,7 @@ impl Effect {
             confused_with: table.confused_with,
             shown_by: table.shown_by.unwrap_or_default(),
             baseline: table.baseline,
-            first_joint_only: table.joints == Some(ActsOn::First),
+            acts_on: table.joints.unwrap_or_default(),
         })
     }
 }

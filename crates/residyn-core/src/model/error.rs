@@ -22,6 +22,9 @@ pub enum ModelError {
     /// The effect acts only on a first joint that turns.
     #[error("`{effect}` acts on the first joint only, which must be revolute")]
     FirstJointOnly { effect: String },
+    /// The effect repeats with each turn of its joint.
+    #[error("`{effect}` acts on joints that turn only: it repeats with each turn")]
+    TurningJointsOnly { effect: String },
     /// The effect acts only on the last joint of a chain of bodies.
     #[error("`{effect}` acts only on the last joint of a chain of bodies")]
     LastJointOnly { effect: String },

@@ -1,7 +1,7 @@
 //! Declared parameters that are held fixed although the rig may have another value.
 
 use super::Parameter;
-use super::effect::{Effect, EffectParameter, Entry, Measure};
+use super::effect::{ActsOn, Effect, EffectParameter, Entry, Measure};
 use super::fitted::FittedEffect;
 use super::reader::Located;
 use super::system::{Model, Motion};
@@ -86,7 +86,7 @@ fn shift(k: usize, declared: &Parameter) -> Effect {
             "a measurement of `{}` itself, or motion after it has been changed by a known amount",
             declared.name
         ),
-        first_joint_only: false,
+        acts_on: ActsOn::All,
         baseline: None,
     }
 }

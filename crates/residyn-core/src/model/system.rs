@@ -6,7 +6,7 @@ use super::bodies::Bodies;
 use super::chain::{Body, Recovered};
 use super::drive::Drive;
 use super::dynamics::{Dynamics, Parameter, PerLogValue};
-use super::effect::{Effect, Entry, Measure};
+use super::effect::{ActsOn, Effect, Entry, Measure};
 use super::error::ModelError;
 use super::fitted::FittedEffect;
 use super::reader::Located;
@@ -265,8 +265,15 @@ impl Model {
     /// Why not.
     pub fn can_carry(&self, effect: &Effect, joint: Joint) -> Result<(), ModelError> {
         let name = || effect.name.clone();
-        if effect.first_joint_only && (joint.index() > 0 || self.prismatic[joint]) {
-            return Err(ModelError::FirstJointOnly { effect: name() });
+        let slides = self.prismatic[joint];
+        match effect.acts_on {
+            ActsOn::First if slides || joint.index() > 0 => {
+                return Err(ModelError::FirstJointOnly { effect: name() });
+            }
+            ActsOn::Turning if slides => {
+                return Err(ModelError::TurningJointsOnly { effect: name() });
+            }
+            _ => {}
         }
         match effect.entry {
             Entry::Payload(_) if !self.carries_at(joint) => {

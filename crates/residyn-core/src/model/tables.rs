@@ -4,10 +4,11 @@
 //! `[columns]`, `[drive]`, `[dynamics]` and `[[effect]]` have keys that depend on the model: they are read in
 //! `columns_in_file.rs`, `drive.rs`, `sections.rs` and `effects_in_file.rs`.
 
+use super::effect::ActsOn;
 use super::effect::Measure;
 use super::filter::CommandFilter;
 use super::reader::{Entry, FileError, Located, Section};
-use super::values::{ActsOn, EachLog, Limits, Named, OrTable, Read};
+use super::values::{EachLog, Limits, Named, OrTable, Read};
 use crate::data::TorqueColumn;
 use crate::expr::Formula;
 

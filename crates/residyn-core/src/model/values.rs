@@ -2,7 +2,7 @@
 
 use toml::de::DeValue;
 
-use super::effect::Measure;
+use super::effect::{ActsOn, Measure};
 use super::filter::CommandFilter;
 use super::fitted::Status;
 use super::reader::{Entry, FileError, Located, Section};
@@ -38,13 +38,6 @@ pub(super) enum OrTable<T, U> {
 
 /// Two numbers, each infinite if it limits nothing.
 pub(super) struct Limits(pub [f64; 2]);
-
-/// The joints that an effect acts on.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum ActsOn {
-    All,
-    First,
-}
 
 /// What has a separate value of a parameter.
 #[derive(Clone, Copy)]
@@ -231,7 +224,11 @@ impl Word for TorqueColumn {
 }
 
 impl Word for ActsOn {
-    const WORDS: &'static [(&'static str, Self)] = &[("all", Self::All), ("first", Self::First)];
+    const WORDS: &'static [(&'static str, Self)] = &[
+        ("all", Self::All),
+        ("first", Self::First),
+        ("turning", Self::Turning),
+    ];
 }
 
 impl Word for EachLog {
