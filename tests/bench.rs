@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use residyn::read_model;
+use residyn_core::data::Log;
 use residyn_core::model::{FittedEffect, Library};
 use residyn_core::sim::metric::assess;
 use residyn_io::write_log;
-use residyn_validation::{Cell, Group, Hidden, Mechanics, Source, read, recorded};
+use residyn_validation::{Cell, Group, Hidden, Mechanics, Source, Truth, read, recorded};
 
 use crate::support::paths::configs;
 use crate::support::tables::rows;
@@ -103,6 +104,60 @@ fn rigs_are_drawn_by_their_rules_and_the_same_each_time() {
         assert!((0.0..=0.03).contains(&condition.flaws.dropped));
         assert_eq!(condition.drive.len(), 2);
     }
+}
+
+/// The cell of this name with its rig drawn, and its logs.
+fn drawn(grid: &str, id: &str) -> (Cell, Vec<Log>, Truth) {
+    let library = Library::built_in();
+    let cells = read(&path(grid)).unwrap();
+    let cell = cells.into_iter().find(|cell| cell.id == id).unwrap();
+    let cell = cell.settled(&library).unwrap();
+    let (logs, truth) = cell.record(&cell.declared(&library).unwrap()).unwrap();
+    (cell, logs, truth)
+}
+
+#[test]
+fn sticking_joints_rest_about_half_of_the_time() {
+    let mut shares = Vec::new();
+    for number in 1..=8 {
+        let (_, logs, truth) = drawn("sticking.toml", &format!("sticking/hidden/{number}"));
+        assert_eq!(truth.effects.len(), 2);
+        let q = &logs[0].q[0];
+        // Noise and the encoder's step stay below a milliradian.
+        let rests = q.windows(4).filter(|four| (four[3] - four[0]).abs() < 2e-3);
+        shares.push(rests.count() as f64 / q.len() as f64);
+    }
+    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+    assert!((0.35..0.75).contains(&mean), "{shares:?}");
+}
+
+#[test]
+fn what_the_model_declares_is_not_hidden() {
+    let (cell, _, truth) = drawn("sticking.toml", "sticking/declared/1");
+    assert_eq!((cell.effects.len(), truth.effects.len()), (2, 0));
+}
+
+#[test]
+fn logs_with_repeated_rows_are_otherwise_those_without() {
+    let (mut cell, logs, _) = drawn("repeated.toml", "repeated/none/1");
+    let Source::Simulated(simulation) = &mut cell.source else {
+        panic!("{}: not simulated", cell.id)
+    };
+    simulation.condition.flaws.repeated = 0.0;
+    let model = cell.declared(&Library::built_in()).unwrap();
+    let (clean, _) = cell.record(&model).unwrap();
+    let [mut changed, mut all] = [0, 0];
+    for (log, clean) in logs.iter().zip(&clean) {
+        assert_eq!(log.time, clean.time);
+        for row in 1..log.rows() {
+            let q = log.q[0][row];
+            assert!(q == clean.q[0][row] || q == log.q[0][row - 1]);
+            changed += usize::from(log.tau[0][row] != clean.tau[0][row]);
+        }
+        all += log.rows();
+    }
+    let share = changed as f64 / all as f64;
+    assert!((0.005..0.15).contains(&share), "{share}");
 }
 
 #[test]

@@ -6,15 +6,16 @@ use anyhow::{Context, Error, anyhow};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-use super::answer::answer;
+use super::answer::{answer, label_of};
 use super::coverage::Coverage;
 use super::draw::Drawn;
 use super::grid::{Cell, Group, Simulation, Source};
-use super::hidden::Hidden;
+use super::hidden::{Hidden, Label};
 use super::identifiable::Told;
 use super::judge::{Answer, Judgement, Truth, judge};
 use super::machine::Machine;
 use super::mechanics::Pair;
+use super::sensors::repeat;
 use residyn_core::closeloop::{Outcome, Request, Settings, Split, StudyError, close_loop};
 use residyn_core::data::{Log, LogError};
 use residyn_core::model::{Library, Model};
@@ -150,7 +151,7 @@ impl Cell {
                 let logs = logs.iter().map(read).collect::<Result<_, LogError>>()?;
                 Ok((logs, Truth::of(&self.effects, declared.clone(), &[])))
             }
-            Source::Simulated(simulation) => Ok(self.simulate(simulation)),
+            Source::Simulated(simulation) => Ok(self.simulate(simulation, &self.hidden(model))),
             Source::Arm(arm) => {
                 let logs = arm.record(model, &self.effects, &mut self.rng());
                 let logs = logs.map_err(|message| anyhow!("{}: {message}", self.id))?;
@@ -160,7 +161,7 @@ impl Cell {
         }
     }
 
-    fn simulate(&self, simulation: &Simulation) -> (Vec<Log>, Truth) {
+    fn simulate(&self, simulation: &Simulation, hidden: &[Hidden]) -> (Vec<Log>, Truth) {
         let (driving, condition) = (&simulation.driving, &simulation.condition);
         let machine = Machine::with(simulation.mechanics.clone(), &self.effects)
             .expect("the effects were checked when the grid was read");
@@ -168,11 +169,30 @@ impl Cell {
         let offsets: Vec<Pair> = (0..condition.logs)
             .map(|_| self.draw_offset(&mut rng))
             .collect();
-        let truth = Truth::of(&self.effects, machine.declared(), &offsets);
+        let truth = Truth::of(hidden, machine.declared(), &offsets);
         let record = |(index, offset): (usize, &Pair)| {
             machine.record(driving, condition, index, *offset, &mut rng)
         };
-        (offsets.iter().enumerate().map(record).collect(), truth)
+        let mut logs: Vec<Log> = offsets.iter().enumerate().map(record).collect();
+        logs.iter_mut()
+            .for_each(|log| repeat(log, &condition.flaws, &mut rng));
+        (logs, truth)
+    }
+
+    /// The effects that the model does not declare.
+    fn hidden(&self, model: &Model) -> Vec<Hidden> {
+        let declared: Vec<Label> = model.effects.iter().map(label_of).collect();
+        let hidden = |effect: &&Hidden| !declared.contains(&effect.label());
+        self.effects.iter().filter(hidden).cloned().collect()
+    }
+
+    /// The cell whose logs are the same but for repeated readings.
+    fn without_repeats(&self) -> Self {
+        let mut cell = self.clone();
+        if let Source::Simulated(simulation) = &mut cell.source {
+            simulation.condition.flaws.repeated = 0.0;
+        }
+        cell
     }
 
     /// Each cell has its own motion and noise.
@@ -199,7 +219,7 @@ impl Cell {
         let (logs, mut truth) = self.record(&model)?;
         let split = last_is_test(logs);
         let settings = Settings::default();
-        let (effects, known) = (&self.effects, &truth.declared);
+        let (effects, known) = (&self.hidden(&model), &truth.declared);
         // Arms are compared by torques, which this fit does not handle.
         let message = match self.source {
             Source::Arm(_) => None,
@@ -216,6 +236,11 @@ impl Cell {
         if self.group == Group::Several {
             truth.twins = message.as_ref().map(Told::twins).unwrap_or_default();
         }
+        if self.group == Group::Repeated {
+            let (logs, _) = self.without_repeats().record(&model)?;
+            let outcome = close(&model, library, last_is_test(logs), self.seed)?;
+            truth.effects = without_sizes(&answer(&outcome));
+        }
         let outcome = close(&model, library, split.clone(), self.seed)?;
         let answer = answer(&outcome);
         Ok(Findings::Searched(Box::new(Searched {
@@ -229,6 +254,14 @@ impl Cell {
             answer,
         })))
     }
+}
+
+/// What an answer names.
+fn without_sizes(answer: &Answer) -> Vec<(Label, BTreeMap<String, f64>)> {
+    let named = answer.named.iter();
+    named
+        .map(|named| (named.label.clone(), BTreeMap::new()))
+        .collect()
 }
 
 /// The method under test.

@@ -36,6 +36,8 @@ pub enum Loop {
     Steps,
     /// Released from up to twice the reference's size, under half the open-loop torque.
     Release,
+    /// A bench that moves the rig along a path of many frequencies, whatever torque that takes; the torque is measured.
+    Imposed,
 }
 
 /// How logs are taken.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::arm::{Arm, Lacks};
+use super::arm::{Arm, Column, Lacks};
 use super::condition::{Condition, Driving, check_rows};
 use super::draw::{Recipe, Rules};
 use super::hidden::Hidden;
@@ -40,10 +40,12 @@ pub enum Group {
     Several,
     /// As above, but the program is told which, and its intervals have to hold the truth.
     Told,
-    /// Nothing is missing and nothing may be named.
+    /// Nothing is missing, as the model declares all effects of the rig, and nothing may be named.
     None,
     /// An effect that the library lacks is missing; it has to be flagged.
     Outside,
+    /// Rows repeat readings: what is named has to be what is named without.
+    Repeated,
 }
 
 /// A simulated rig and the model that is declared for it.
@@ -92,6 +94,8 @@ struct Arms {
     rate_hz: f64,
     seconds: Vec<f64>,
     noise: [f64; 2],
+    #[serde(default)]
+    column: Column,
 }
 
 /// Every set of effects under every condition with every seed.
@@ -369,6 +373,7 @@ impl Arms {
                 rate_hz: self.rate_hz,
                 seconds: self.seconds.clone(),
                 noise: self.noise,
+                column: self.column,
             })),
         };
         let of_kind = |lacks: &Lacks| (first..=last).map(|number| cell(*lacks, number)).collect();

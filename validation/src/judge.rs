@@ -159,7 +159,7 @@ pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
         .filter(|label| wrong.contains(label))
         .collect();
     let passed = match group {
-        Group::Single | Group::Pair | Group::Several | Group::Told => exact,
+        Group::Single | Group::Pair | Group::Several | Group::Told | Group::Repeated => exact,
         Group::None => named.is_empty() && !flagged,
         Group::Outside => flagged && weak.is_empty(),
     };

@@ -155,6 +155,17 @@ impl Machine {
         balance
     }
 
+    /// The torques that a motion takes \[N m\].
+    pub(super) fn needed(&self, time: f64, state: &State, acceleration: Pair) -> Pair {
+        let balance = self.balance(time, state, &[Approach::default(); 2]);
+        [0, 1].map(|j| {
+            let [first, second] = balance.mass[j];
+            let inertial = first * acceleration[0] + second * acceleration[1];
+            let direction = state.v[j].signum();
+            inertial - balance.free[j] + direction * self.level(j, direction, state, 0.0)
+        })
+    }
+
     /// Total dry-friction level of a joint against motion in `direction` \[N m\].
     fn level(&self, joint: usize, direction: f64, state: &State, load: f64) -> f64 {
         let own = self.dry.iter().filter(|(of, _)| *of == joint);

@@ -18,6 +18,8 @@ const STRENGTHS: [f64; 6] = [1.2, 0.5, 0.8, 1.0, 0.7, 0.9];
 enum Source {
     Open(Signal),
     Closed(Multisine, Controller),
+    /// The torque follows from this motion.
+    Imposed(Multisine),
 }
 
 impl Source {
@@ -33,6 +35,10 @@ impl Source {
             Loop::Release => Self::Open(multisine(0.5 * size)),
             Loop::Chirp => Self::Open(chirp(size, band, seconds, rng)),
             Loop::Steps => Self::Open(steps(size, band, seconds, rng)),
+            Loop::Imposed => {
+                let size = strength * driving.reference[j];
+                Self::Imposed(Multisine::draw(size, driving.reference_hz, rng))
+            }
             Loop::Closed => {
                 let size = strength * driving.reference[j];
                 let controller = Controller {
@@ -53,6 +59,7 @@ impl Source {
                 let wanted = [reference.at(time), reference.rate(time)];
                 controller.command(measured, wanted, dt)
             }
+            Self::Imposed(_) => 0.0,
         }
     }
 }
@@ -99,7 +106,7 @@ impl Machine {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand
         let rows = (condition.seconds * condition.rate_hz).round() as usize + 1;
         let mut clock = Clock::new(condition.rate_hz, flaws);
-        let mut losses = Losses::new(flaws);
+        let mut losses = Losses::new(flaws.dropped, flaws.burst);
         let mut speeds = vec![Speed::default(); joints];
         let mut wires = Wires::default();
         let mut state = start(driving, how, effort.strength, rng);
@@ -109,13 +116,14 @@ impl Machine {
         for row in 0..rows {
             // The first and the last row are always kept, so that the log has its intended length.
             let kept = !losses.next(rng) || row == 0 || row == rows - 1;
+            let needed = self.follow(&sources, time, &mut state);
             let encoders = self.encoders(&state);
             let mut command = [0.0; 2];
             for j in 0..joints {
                 let angle = encoders[j] + offset[j];
                 let q = sensed(angle, condition.noise, condition.quantum, rng);
                 let qd = speeds[j].at(q, dt, flaws.filter_s);
-                command[j] = sources[j].command(q, time, dt);
+                command[j] = sources[j].command(q, time, dt) + needed[j];
                 if kept {
                     log.q[j].push(q);
                     log.qd[j].push(qd);
@@ -123,7 +131,7 @@ impl Machine {
                 }
             }
             if kept {
-                log.time.push(time);
+                log.time.push(clock.stamp(time, rng));
             }
             wires.issue(time, command);
             let next = clock.next(rng);
@@ -131,6 +139,19 @@ impl Machine {
             (dt, time) = (next - time, next);
         }
         log
+    }
+
+    /// Moves the joints to where a bench imposes them; the torques that this takes \[N m\].
+    fn follow(&self, sources: &[Source], time: f64, state: &mut State) -> Pair {
+        let mut acceleration = [0.0; 2];
+        for (j, source) in sources.iter().enumerate() {
+            let Source::Imposed(path) = source else {
+                return [0.0; 2];
+            };
+            (state.q[j], state.v[j]) = (path.at(time), path.rate(time));
+            acceleration[j] = path.acceleration(time);
+        }
+        self.needed(time, state, acceleration)
     }
 
     /// Integrates from one reading to the next \[s\], split when a command arrives at a drive.
@@ -153,7 +174,7 @@ mod tests {
     use crate::machine::Machine;
     use crate::mechanics::Mechanics;
     use crate::mechanics::tests::pendulum;
-    use crate::sensors::Flaws;
+    use crate::sensors::{Flaws, repeat};
     use residyn_core::data::Log;
     use residyn_core::rng;
 
@@ -284,6 +305,40 @@ mod tests {
             let difference = (noisy.q[0][row] - noisy.q[0][row - 1]) / 0.01;
             assert!((noisy.qd[0][row] - difference).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn the_torque_of_an_imposed_motion_carries_friction_in_both_directions() {
+        let machine = Machine::bare(WHEEL)
+            .hiding(0, "coulomb_friction", &[("F_c", 7.0)])
+            .hiding(0, "constant_torque", &[("tau_0", 40.0)]);
+        let [path, bare] = [machine, Machine::bare(WHEEL)]
+            .map(|machine| record(&machine, &condition(Loop::Imposed), 0.0));
+        assert_eq!(path.q, bare.q);
+        for row in 1..path.rows() {
+            let added = path.tau[0][row] - bare.tau[0][row] + 40.0;
+            assert!((added.abs() - 7.0).abs() < 1e-9, "row {row}: {added}");
+        }
+    }
+
+    #[test]
+    fn repeated_rows_hold_the_readings_before_them() {
+        let clean = record(&Machine::bare(pendulum()), &condition(Loop::Open), 0.0);
+        let mut log = clean.clone();
+        let flaws = Flaws {
+            repeated: 0.1,
+            burst: 3,
+            ..Flaws::default()
+        };
+        repeat(&mut log, &flaws, &mut rng(1));
+        let same = (1..log.rows()).filter(|row| log.q[0][*row] != clean.q[0][*row]);
+        let same: Vec<usize> = same.collect();
+        assert!((20..70).contains(&same.len()), "{same:?}");
+        for row in same {
+            let of = |row: usize| [log.q[0][row], log.qd[0][row], log.tau[0][row]];
+            assert_eq!(of(row), of(row - 1));
+        }
+        assert_eq!(log.time, clean.time);
     }
 
     #[test]

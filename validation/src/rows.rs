@@ -138,6 +138,10 @@ pub fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
             of(Group::Outside, &passed),
         ),
     ]);
+    rows.push(Row::new(
+        "repeated readings: the same effects as without",
+        of(Group::Repeated, &passed),
+    ));
     rows.extend(rows_of_intervals(done));
     rows.push(Row::new(
         "error after within a tenth of that of the true structure",

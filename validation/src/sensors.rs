@@ -6,15 +6,21 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, Normal};
 use serde::{Deserialize, Serialize};
 
+use residyn_core::data::Log;
+
 /// Flaws of a logger; all zero for a good one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Flaws {
     /// Standard deviation of the time between two rows, as a share of that time.
     pub jitter: f64,
+    /// Standard deviation of the reported times from those of the readings \[s\].
+    pub stamps_s: f64,
     /// Share of the rows that are lost.
     pub dropped: f64,
-    /// Largest number of rows lost at once.
+    /// Share of the rows that repeat all readings of the row before.
+    pub repeated: f64,
+    /// Largest number of rows lost or repeated at once.
     pub burst: usize,
     /// Standard deviation of the logged torque, and the step in which it is logged (zero for a fine one), as shares of
     /// the joint's largest torque.
@@ -32,14 +38,16 @@ impl Flaws {
     pub(crate) fn check(&self) -> Result<(), String> {
         let sizes = [
             self.jitter,
+            self.stamps_s,
             self.torque_noise,
             self.torque_quantum,
             self.filter_s,
         ];
         let sound = sizes.iter().all(|size| *size >= 0.0)
-            && (0.0..0.5).contains(&self.dropped)
-            && (self.dropped == 0.0 || self.burst > 0);
-        let needs = "`flaws` needs numbers that are not negative, `dropped` below a half, and `burst` with it";
+            && [self.dropped, self.repeated]
+                .iter()
+                .all(|share| (0.0..0.5).contains(share) && (*share == 0.0 || self.burst > 0));
+        let needs = "`flaws` needs numbers that are not negative, `dropped` and `repeated` below a half, and `burst` with them";
         if sound { Ok(()) } else { Err(needs.to_owned()) }
     }
 
@@ -81,18 +89,35 @@ impl<'c> Clock<'c> {
         };
         (f64::from(self.ticks) + off.clamp(-FARTHEST, FARTHEST)) * self.step_s
     }
+
+    /// The time that is reported for a reading at `time` \[s\].
+    pub fn stamp(&self, time: f64, rng: &mut impl Rng) -> f64 {
+        match self.flaws.stamps_s {
+            deviation if deviation > 0.0 => {
+                let farthest = FARTHEST * self.step_s;
+                time + normal(deviation, rng).clamp(-farthest, farthest)
+            }
+            _ => time,
+        }
+    }
 }
 
-/// Which rows are lost.
-pub struct Losses<'c> {
-    flaws: &'c Flaws,
+/// Which rows are lost, or repeated.
+pub struct Losses {
+    share: f64,
+    /// Largest number at once.
+    burst: usize,
     /// Number of rows still to be lost in the current loss.
     left: usize,
 }
 
-impl<'c> Losses<'c> {
-    pub fn new(flaws: &'c Flaws) -> Self {
-        Self { flaws, left: 0 }
+impl Losses {
+    pub fn new(share: f64, burst: usize) -> Self {
+        Self {
+            share,
+            burst,
+            left: 0,
+        }
     }
 
     /// Whether the next row is lost.
@@ -101,18 +126,30 @@ impl<'c> Losses<'c> {
             self.left -= 1;
             return true;
         }
-        if self.flaws.dropped == 0.0 {
+        if self.share == 0.0 {
             return false;
         }
         #[allow(clippy::cast_precision_loss)] // a few rows
-        let mean = 0.5 * (1 + self.flaws.burst) as f64;
+        let mean = 0.5 * (1 + self.burst) as f64;
         // Losses of `mean` rows begin in this share of the rows between them.
-        let begins = self.flaws.dropped / (mean * (1.0 - self.flaws.dropped));
+        let begins = self.share / (mean * (1.0 - self.share));
         let lost = rng.random::<f64>() < begins;
         if lost {
-            self.left = rng.random_range(0..self.flaws.burst);
+            self.left = rng.random_range(0..self.burst);
         }
         lost
+    }
+}
+
+/// Rows of `log` that repeat all readings of the row before, at their own times.
+pub fn repeat(log: &mut Log, flaws: &Flaws, rng: &mut impl Rng) {
+    let mut repeats = Losses::new(flaws.repeated, flaws.burst);
+    for row in 1..log.rows() {
+        if repeats.next(rng) {
+            let channels = [&mut log.q, &mut log.qd, &mut log.tau];
+            let all = channels.into_iter().flatten();
+            all.for_each(|channel| channel[row] = channel[row - 1]);
+        }
     }
 }
 
@@ -155,7 +192,9 @@ mod tests {
 
     const MESSY: Flaws = Flaws {
         jitter: 0.2,
+        stamps_s: 3e-4,
         dropped: 0.03,
+        repeated: 0.0,
         burst: 4,
         torque_noise: 0.0,
         torque_quantum: 0.0,
@@ -173,12 +212,15 @@ mod tests {
         let deviation = (square / steps.len() as f64).sqrt() / 0.01;
         assert!((deviation - 0.2).abs() < 0.01, "{deviation}");
         assert!((times[19_999] - 200.0).abs() < 0.01);
+        let off = |time: &f64| (clock.stamp(*time, rng) - time).powi(2);
+        let deviation = (times.iter().map(off).sum::<f64>() / times.len() as f64).sqrt();
+        assert!((deviation - 3e-4).abs() < 1e-5, "{deviation}");
     }
 
     #[test]
     fn rows_are_lost_in_the_share_asked_for_and_several_at_once() {
         let rng = &mut rng(3);
-        let mut losses = Losses::new(&MESSY);
+        let mut losses = Losses::new(MESSY.dropped, MESSY.burst);
         let lost: Vec<bool> = (0..100_000).map(|_| losses.next(rng)).collect();
         let count = lost.iter().filter(|lost| **lost).count();
         assert!((2700..3300).contains(&count), "{count}");

@@ -39,12 +39,45 @@ pub struct Summary {
     pub not_told: usize,
     /// Cells passed, by the name of each hidden effect.
     pub by_effect: Vec<Row>,
-    /// Cells passed, by plant and condition.
-    pub by_condition: Vec<Row>,
+    /// By plant and condition.
+    pub parts: Vec<Part>,
     /// Intervals that hold the truth, by parameter.
     pub by_parameter: Vec<Row>,
     pub failures: Vec<Failure>,
     pub seconds: Seconds,
+}
+
+/// The cells of a plant under a condition.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Part {
+    pub name: String,
+    pub cells: usize,
+    pub passed: usize,
+    /// Cells whose hidden effects were named, and nothing else.
+    pub exact: usize,
+    /// Effects that are named and not hidden, and hidden ones that are not named, in all cells together.
+    pub false_names: usize,
+    pub missed: usize,
+    /// Cells that report a missing effect although all hidden effects are named.
+    pub false_alarms: usize,
+    /// Run time of all cells \[s\].
+    pub seconds: f64,
+}
+
+impl Part {
+    fn add(&mut self, line: &Line) {
+        self.cells += 1;
+        self.seconds += line.seconds;
+        let done = Done::of(line);
+        let Some(Searched { judgement, .. }) = done.findings else {
+            return;
+        };
+        self.passed += usize::from(judgement.passed);
+        self.exact += usize::from(judgement.exact);
+        self.false_names += judgement.wrong.len();
+        self.missed += judgement.missed.len();
+        self.false_alarms += usize::from(judgement.flagged && judgement.missed.is_empty());
+    }
 }
 
 /// A cell that did not pass.
@@ -88,13 +121,22 @@ pub fn summarise(lines: &[Line]) -> Summary {
         by_effect: by(&done, |d| {
             d.cell.effects.iter().map(|e| e.name.clone()).collect()
         }),
-        by_condition: by(&done, |d| {
-            vec![format!("{}, {}", d.cell.plant, d.cell.condition)]
-        }),
+        parts: parts(lines),
         by_parameter: by_parameter(&done),
         failures: done.iter().filter_map(failure).collect(),
         seconds: seconds(lines),
     }
+}
+
+fn parts(lines: &[Line]) -> Vec<Part> {
+    let mut all: BTreeMap<String, Part> = BTreeMap::new();
+    for line in lines.iter().filter(|line| line.cell.group != Group::Told) {
+        let name = format!("{}, {}", line.cell.plant, line.cell.condition);
+        let part = all.entry(name.clone()).or_default();
+        part.name = name;
+        part.add(line);
+    }
+    all.into_values().collect()
 }
 
 fn by(done: &[Done<'_>], keys: impl Fn(&Done<'_>) -> Vec<String>) -> Vec<Row> {
@@ -199,7 +241,6 @@ pub fn markdown(summary: &Summary) -> String {
     }
     let tables = [
         ("effect hidden", "passed", &summary.by_effect),
-        ("plant, condition", "passed", &summary.by_condition),
         (
             "parameter",
             "intervals that hold the truth",
@@ -213,6 +254,7 @@ pub fn markdown(summary: &Summary) -> String {
         );
         rows.iter().for_each(|row| push_row(&mut text, row));
     }
+    push_parts(&mut text, &summary.parts);
     push_failures(&mut text, summary);
     text
 }
@@ -226,6 +268,27 @@ fn push_row(text: &mut String, row: &Row) {
             text,
             "| {} | {hits} of {of} | {share:.0} % | {low:.0} to {high:.0} % |",
             row.what
+        );
+    }
+}
+
+fn push_parts(text: &mut String, parts: &[Part]) {
+    *text += "\n| plant, condition | cells | passed | exact | false names | missed | flagged though nothing is missing | seconds |\n";
+    *text += "|---|---|---|---|---|---|---|---|\n";
+    for part in parts {
+        let Part {
+            name,
+            cells,
+            passed,
+            exact,
+            false_names,
+            missed,
+            false_alarms,
+            seconds,
+        } = part;
+        let _ = writeln!(
+            text,
+            "| {name} | {cells} | {passed} | {exact} | {false_names} | {missed} | {false_alarms} | {seconds:.0} |"
         );
     }
 }

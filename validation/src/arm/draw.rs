@@ -23,13 +23,18 @@ impl Arm {
         }
         let (sizes, speeds) = typical(bodies, motion);
         let joints: Vec<Joint> = Joint::all(sizes.len()).collect();
+        if self.lacks == Lacks::CoulombViscous {
+            let mut both =
+                |joint: &Joint| coulomb_viscous(*joint, sizes[*joint], speeds[*joint], rng);
+            return joints.iter().flat_map(&mut both).collect();
+        }
         let mut effects: Vec<Hidden> = joints
             .iter()
             .map(|joint| friction(*joint, sizes[*joint], speeds[*joint], rng))
             .collect();
         let last = joints.len() - 1;
         match self.lacks {
-            Lacks::Nothing | Lacks::Friction => {}
+            Lacks::Nothing | Lacks::CoulombViscous | Lacks::Friction => {}
             Lacks::LoadFriction => {
                 // A joint where the bodies load the gear.
                 let joint = joints[rng.random_range(1..3)];
@@ -66,6 +71,14 @@ impl Arm {
         }
         effects
     }
+}
+
+fn coulomb_viscous(joint: Joint, size: f64, speed: f64, rng: &mut impl Rng) -> [Hidden; 2] {
+    let mut level = || size * rng.random_range(SHARES[0]..SHARES[1]);
+    [
+        Hidden::new("coulomb_friction", joint, &[("F_c", level())]),
+        Hidden::new("viscous_friction", joint, &[("b", level() / speed)]),
+    ]
 }
 
 /// One of four kinds of friction.

@@ -53,7 +53,7 @@ impl Recipe {
         model: &Model,
         library: &Library,
     ) -> Result<Option<usize>> {
-        if drawn.effects.is_empty() {
+        if drawn.effects.is_empty() || self.rules.matters == 0.0 {
             return Ok(None);
         }
         let settings = Settings::default();

@@ -214,6 +214,11 @@ impl Recipe {
         if rules.filter_s.is_empty() {
             return Err("`filter_s` needs a number".to_owned());
         }
+        let mut plain = |size: &Option<Size>| match size {
+            Some(size) => size.plain(rng),
+            None => Ok(0.0),
+        };
+        let (stamps_s, repeated) = (plain(&rules.stamps_s)?, plain(&rules.repeated)?);
         let quantum = TAU / 2.0_f64.powf(rules.bits.plain(rng)?);
         Ok(Condition {
             drive: loops,
@@ -224,6 +229,8 @@ impl Recipe {
             seconds: rules.seconds.plain(rng)?,
             flaws: Flaws {
                 jitter: rules.jitter.plain(rng)?,
+                stamps_s,
+                repeated,
                 dropped: rules.dropped.plain(rng)?,
                 burst: rules.burst.count(rng)?,
                 torque_noise: rules.torque_noise.plain(rng)?,

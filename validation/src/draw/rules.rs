@@ -15,7 +15,8 @@ pub struct Rules {
     pub condition: ConditionRules,
     /// Free parameters of the model file start at the true value, times or divided by up to this factor.
     pub start: Size,
-    /// An effect matters if the best fit without it has at least this many times the error.
+    /// An effect matters if the best fit without it has at least this many times the error; zero: any does, and rigs
+    /// do not depend on what can be fitted.
     pub matters: f64,
     /// Effects of the library, by name.
     pub effects: BTreeMap<String, Kind>,
@@ -40,6 +41,9 @@ pub struct ConditionRules {
     pub noise: Size,
     pub jitter: Size,
     pub dropped: Size,
+    /// Standard deviation of the reported times \[s\], and the share of rows that repeat readings: none if not given.
+    pub stamps_s: Option<Size>,
+    pub repeated: Option<Size>,
     pub burst: Size,
     /// Standard deviation of the logged torque, and its step, as shares of the joint's largest torque.
     pub torque_noise: Size,

@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use residyn_core::closeloop::Settings;
-use residyn_core::data::{Log, statistics::median};
+use residyn_core::data::Log;
+use residyn_core::data::statistics::{mean, median, standard_error};
 use residyn_core::model::Dynamics;
 use residyn_core::sim::metric::{Assessment, OpenLoop, assess};
 
@@ -85,8 +86,38 @@ impl Squares {
         (self.sum / self.count as f64).sqrt()
     }
 
+    /// By how many standard errors the squared error of a window is larger than another model's, on average over the
+    /// same windows; NaN if they are not the same, or one.
+    pub fn above(&self, other: &Self) -> f64 {
+        let pairs = self.windows.iter().zip(&other.windows);
+        let rises: Vec<f64> = pairs
+            .map(|(own, other)| own.powi(2) - other.powi(2))
+            .collect();
+        match self.windows.len() == other.windows.len() && rises.len() > 1 {
+            true => mean(&rises) / standard_error(&rises),
+            false => f64::NAN,
+        }
+    }
+
     /// Median over the windows of each window's root mean square \[rad\].
     pub fn median(&self) -> f64 {
         median(&self.windows)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Squares;
+
+    #[test]
+    fn errors_are_above_others_by_the_spread_of_their_windows() {
+        let of = |windows: [f64; 4]| Squares {
+            windows: windows.into(),
+            ..Squares::default()
+        };
+        let (base, above) = (of([1.0, 2.0, 3.0, 4.0]), of([1.1, 2.1, 3.1, 4.1]));
+        assert!(above.above(&base) > 3.0 && base.above(&above) < -3.0);
+        assert!(of([1.5, 1.5, 3.5, 3.5]).above(&base).abs() < 1.0);
+        assert!(Squares::default().above(&base).is_nan());
     }
 }

@@ -84,7 +84,7 @@ fn model(rig: &Rig, declared: &Declared, library: &Library) -> Result<Model, Rig
     Ok(model)
 }
 
-/// The model with these effects on every joint, absent until they are fitted.
+/// The model with these effects on every joint, absent until they are fitted, beside those that it declares.
 fn with_plain(
     declared: &Model,
     effects: &[String],
@@ -95,6 +95,10 @@ fn with_plain(
         let effect = library.effect(name)?;
         for joint in Joint::all(declared.joints) {
             let new = FittedEffect::absent(effect, joint);
+            let declares = |own: &FittedEffect| own.effect.name == *name && own.joint == joint;
+            if declared.effects.iter().any(declares) {
+                continue;
+            }
             declared.check_effect(&new, &all)?;
             all.push(new);
         }

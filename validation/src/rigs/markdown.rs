@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::table::{Entry, Row, Summary};
+use super::table::{Compared, Entry, Row, Summary};
 
 /// Errors after closing the loop that are at most this share of the best other error are clearly better.
 const CLEARLY: f64 = 0.9;
@@ -15,8 +15,8 @@ pub fn markdown(summary: &Summary) -> String {
     let mut text = String::from(
         "Open-loop position error 0.5 s ahead on logs left out of the fit, in mrad: root mean square over all rows \
          of all windows and all joints; the median window in brackets.\n\n\
-         | rig | fits | declared | declared, fitted | plain structure | published | mujoco.sysid | after | hybrid | after / best of \
-         the others | hybrid / after | s a fit |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+         | rig | fits | declared | declared, fitted | usual friction | plain structure | published | mujoco.sysid | after | hybrid | after / best of \
+         the others | hybrid / after | s a fit |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     summary.rows.iter().for_each(|row| push_row(&mut text, row));
     text += &totals(&summary.rows);
@@ -25,6 +25,7 @@ pub fn markdown(summary: &Summary) -> String {
         let (named, verdicts) = (listed(&row.named), listed(&row.verdicts));
         let _ = writeln!(text, "| {} | {named} | {verdicts} |", row.name());
     }
+    push_folds(&mut text, &summary.folds);
     for (method, reason) in &summary.not_run {
         let _ = writeln!(text, "\nNot run: {}: {reason}", method.name());
     }
@@ -35,6 +36,29 @@ pub fn markdown(summary: &Summary) -> String {
         let _ = writeln!(text, "| {fold} | {} | {error} |", method.name());
     }
     text
+}
+
+/// The folds, with simpler models that are better by more than noise in bold.
+fn push_folds(text: &mut String, folds: &[Compared]) {
+    *text += "\n| rig, fold | after | simpler; **better than after by more than noise** |\n|---|---|---|\n";
+    for fold in folds {
+        let simpler = fold.simpler.iter().map(|simpler| {
+            let said = format!("{}: {}", simpler.model, mrad(simpler.error));
+            match simpler.is_better() {
+                true => format!("**{said}**"),
+                false => said,
+            }
+        });
+        let simpler: Vec<String> = simpler.collect();
+        let after = mrad(fold.after);
+        let _ = writeln!(
+            text,
+            "| {}, {} | {after} | {} |",
+            fold.rig,
+            fold.fold,
+            simpler.join(", ")
+        );
+    }
 }
 
 fn push_row(text: &mut String, row: &Row) {
@@ -50,11 +74,12 @@ fn push_row(text: &mut String, row: &Row) {
     let ratio = |ratio: Option<f64>| ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.2}"));
     let _ = writeln!(
         text,
-        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
         row.name(),
         row.folds,
         of("declared"),
         of("declared, fitted"),
+        of("usual friction"),
         of("plain structure"),
         sets.join(", "),
         of("mujoco.sysid"),
@@ -106,7 +131,7 @@ fn reached(rows: &[Row], ratio: fn(&Row) -> Option<f64>, most: f64) -> usize {
 
 fn totals(rows: &[Row]) -> String {
     format!(
-        "\nOf {} rows: error after at most that of the best of the others (plain structure, published sets, mujoco.sysid) in {}, at \
+        "\nOf {} rows: error after at most that of the best of the others (usual friction, plain structure, published sets, mujoco.sysid) in {}, at \
          most {CLEARLY} of it in {}; error with the network at most {NETWORK} of the error after in {}.\n",
         rows.len(),
         reached(rows, |row| row.ratio, 1.0),

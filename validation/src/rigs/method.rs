@@ -24,6 +24,9 @@ pub enum Scored {
     Declared,
     /// The declared model, fitted.
     Fitted,
+    /// The declared model with the usual friction that closing the loop compares with, fitted; the same as `Fitted` if
+    /// that friction is declared.
+    Usual,
     /// The declared model with the plain structure, fitted.
     Plain,
     /// A published parameter set as it is.
@@ -71,6 +74,7 @@ impl fmt::Display for Scored {
         f.write_str(match self {
             Self::Declared => "declared",
             Self::Fitted => "declared, fitted",
+            Self::Usual => "usual friction",
             Self::Plain => "plain structure",
             Self::MujocoSysid => "mujoco.sysid",
             Self::Published(name) => return write!(f, "published {name}"),
@@ -83,7 +87,10 @@ impl fmt::Display for Scored {
 impl Scored {
     /// Whether closing the loop has to do at least as well.
     pub fn is_rival(&self) -> bool {
-        matches!(self, Self::Plain | Self::Published(_) | Self::MujocoSysid)
+        matches!(
+            self,
+            Self::Usual | Self::Plain | Self::Published(_) | Self::MujocoSysid
+        )
     }
 }
 
@@ -123,7 +130,7 @@ impl Method {
             Self::AsTheyAre => std::iter::once(Scored::Declared).chain(published).collect(),
             Self::Plain => vec![Scored::Plain],
             Self::MujocoSysid => vec![Scored::MujocoSysid],
-            Self::CloseLoop => vec![Scored::Fitted, Scored::After, Scored::Hybrid],
+            Self::CloseLoop => vec![Scored::Fitted, Scored::Usual, Scored::After, Scored::Hybrid],
         }
     }
 
@@ -199,9 +206,11 @@ fn closed(
     request.learner = tools.learner;
     let outcome = close_loop(request, &mut rng(tools.seed), watch)?;
     let errors = &outcome.errors;
+    let usual = errors.with_friction.as_ref().unwrap_or(&errors.before);
     let hybrid = errors.hybrid.as_ref().unwrap_or(&errors.after);
     let models = [
         (Scored::Fitted, &errors.before),
+        (Scored::Usual, usual),
         (Scored::After, &errors.after),
         (Scored::Hybrid, hybrid),
     ];

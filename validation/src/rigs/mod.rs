@@ -17,4 +17,4 @@ pub use markdown::markdown;
 pub use method::{Found, Method, Said, Scored, Tools};
 pub use mujoco::Task;
 pub use picture::picture;
-pub use table::{Entry, Horizon, Line, Row, Summary, summarise};
+pub use table::{Compared, Entry, Horizon, Line, Row, Simpler, Summary, summarise};

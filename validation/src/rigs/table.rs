@@ -31,7 +31,7 @@ pub struct Row {
     /// Number of fits that were scored on the row's test logs.
     pub folds: usize,
     pub models: Vec<Entry>,
-    /// The best of the other models (plain structure, published sets, mujoco.sysid), and its error.
+    /// The best of the other models (usual friction, plain structure, published sets, mujoco.sysid), and its error.
     pub best: Option<(String, f64)>,
     /// Error after closing the loop, divided by the best other error.
     pub ratio: Option<f64>,
@@ -70,10 +70,39 @@ pub struct Horizon {
     pub diverged: usize,
 }
 
+/// A fold: the error after closing the loop beside those of simpler models.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Compared {
+    pub rig: String,
+    pub fold: String,
+    /// \[rad\], at the horizon of the table.
+    pub after: f64,
+    pub simpler: Vec<Simpler>,
+}
+
+/// A simpler model in a fold.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Simpler {
+    pub model: String,
+    /// \[rad\]
+    pub error: f64,
+    /// By how many standard errors the error after closing the loop is larger: see [`Squares::above`].
+    pub above: f64,
+}
+
+impl Simpler {
+    /// Whether closing the loop made the model worse than this one by more than noise: one-sided, 5 %.
+    pub fn is_better(&self) -> bool {
+        self.above > 1.645
+    }
+}
+
 /// The results of all rigs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     pub rows: Vec<Row>,
+    /// Each fold in which the loop was closed.
+    pub folds: Vec<Compared>,
     /// Methods that were not run, each with the reason.
     pub not_run: BTreeMap<Method, String>,
     /// Fold, method and error of each failure.
@@ -100,6 +129,10 @@ pub fn summarise(rigs: &[Measured], lines: &[Line], not_run: BTreeMap<Method, St
     };
     Summary {
         rows: rigs.iter().flat_map(row).collect(),
+        folds: rigs
+            .iter()
+            .flat_map(|rig| Lines { rig, lines }.compared())
+            .collect(),
         not_run,
         failures: lines.iter().filter_map(failure).collect(),
         seconds: lines.iter().map(|line| line.seconds).sum(),
@@ -186,6 +219,40 @@ impl<'a> Lines<'a> {
         let is_it =
             |line: &&Line| line.rig == *rig && line.fold == fold.name && line.method == method;
         self.lines.iter().find(is_it)
+    }
+
+    /// The folds in which the loop was closed, each beside simpler models.
+    fn compared(self) -> Vec<Compared> {
+        let fold = |fold: &Fold| {
+            let after = self.squares(fold, Method::CloseLoop, &Scored::After)?;
+            let simpler = |(method, what): (Method, Scored)| {
+                let squares = self.squares(fold, method, &what)?;
+                Some(Simpler {
+                    model: what.to_string(),
+                    error: squares.rms(),
+                    above: after.above(&squares),
+                })
+            };
+            let all = [
+                (Method::CloseLoop, Scored::Fitted),
+                (Method::CloseLoop, Scored::Usual),
+                (Method::Plain, Scored::Plain),
+            ];
+            Some(Compared {
+                rig: self.rig.rig.name.clone(),
+                fold: fold.name.clone(),
+                after: after.rms(),
+                simpler: all.into_iter().filter_map(simpler).collect(),
+            })
+        };
+        self.rig.folds.iter().filter_map(fold).collect()
+    }
+
+    /// The errors of a model on all test logs of a fold, at the horizon of the table.
+    fn squares(self, fold: &Fold, method: Method, what: &Scored) -> Option<Squares> {
+        let errors = self.of(fold, method)?.errors(what)?;
+        let middle = errors.iter().map(|log| &log[log.len() / 2]);
+        Some(Squares::pooled(middle))
     }
 
     fn entry(
