@@ -27,6 +27,7 @@ mod projection;
 mod read;
 mod signal;
 mod smooth;
+mod standstill;
 pub mod statistics;
 mod table;
 pub(crate) mod torque_column;

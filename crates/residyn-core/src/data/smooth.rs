@@ -3,6 +3,7 @@
 use super::instant::{ROUNDING, SAME_S};
 use super::log::Log;
 use super::low_pass::LowPass;
+use super::standstill::rests;
 use super::torque_column::TorqueColumn;
 use crate::limits::log_steps;
 
@@ -29,12 +30,16 @@ pub struct Smooth {
     /// Signs of the velocities, smoothed over a width and filtered like the torques: what remains of friction that
     /// jumps. Empty if no widths are given.
     pub directions: Vec<Vec<f64>>,
+    /// Whether each joint rests.
+    pub rests: Vec<Vec<bool>>,
 }
 
 /// How the channels of a log are smoothed, and which rows of them are used.
 #[derive(Debug, Clone)]
 pub struct Smoothing {
     step_s: f64,
+    /// As a share of the sampling rate.
+    cutoff: f64,
     filter: LowPass,
     /// Times of the log, s.
     logged: Vec<f64>,
@@ -55,6 +60,7 @@ impl Smoothing {
         let inner = 1..even.len().saturating_sub(1);
         Self {
             step_s,
+            cutoff,
             filter: LowPass::new(cutoff),
             middle: middles(&log.time, step_s),
             logged: log.time.clone(),
@@ -103,13 +109,15 @@ impl Smoothing {
 
     /// A channel with values at these times, filtered, at all even times.
     fn filtered(&self, times: &[f64], values: &[f64]) -> Vec<f64> {
-        let even = self.even.iter().copied();
-        let even: Vec<f64> = resampled(even, times, values).collect();
-        self.filter.apply(&even)
+        self.filter.apply(&self.at_even(times, values))
     }
 
-    fn used_of(&self, filtered: &[f64]) -> Vec<f64> {
-        self.used.iter().map(|row| filtered[*row]).collect()
+    fn at_even(&self, times: &[f64], values: &[f64]) -> Vec<f64> {
+        resampled(self.even.iter().copied(), times, values).collect()
+    }
+
+    fn used_of<T: Copy>(&self, all: &[T]) -> Vec<T> {
+        self.used.iter().map(|row| all[*row]).collect()
     }
 }
 
@@ -124,33 +132,31 @@ impl Smooth {
     pub fn by(smoothing: &Smoothing, log: &Log, widths: &[f64]) -> Self {
         let Smoothing {
             step_s,
+            cutoff,
             filter,
             even,
             used,
             ..
         } = smoothing;
-        let q: Vec<Vec<f64>> = (log
-            .q
-            .iter()
-            .map(|q| smoothing.filtered(&smoothing.logged, q)))
-        .collect();
-        let direction = |(q, width): (&Vec<f64>, &f64)| {
-            let speed = |pair: &[f64]| (pair[2] - pair[0]) / (2.0 * step_s);
-            let inner = q.windows(3).map(speed);
-            let signs: Vec<f64> = inner
-                .map(|speed| (speed / width.max(f64::MIN_POSITIVE)).tanh())
-                .collect();
-            // One more at either end, like the rows.
-            let ends = [signs.first(), signs.last()].map(|sign| sign.copied().unwrap_or(0.0));
-            let signs = [&ends[..1], &signs, &ends[1..]].concat();
-            smoothing.used_of(&filter.apply(&signs))
+        let read = |q: &Vec<f64>| smoothing.at_even(&smoothing.logged, q);
+        let read: Vec<Vec<f64>> = log.q.iter().map(read).collect();
+        let q: Vec<Vec<f64>> = read.iter().map(|q| filter.apply(q)).collect();
+        // Angles a step.
+        let speeds: Vec<Vec<f64>> = q.iter().map(|q| central_differences(q)).collect();
+        let direction = |(speeds, width): (&Vec<f64>, &f64)| {
+            let width = width.max(f64::MIN_POSITIVE);
+            let signs = speeds.iter().map(|speed| (speed / step_s / width).tanh());
+            smoothing.used_of(&filter.apply(&signs.collect::<Vec<f64>>()))
         };
+        let of_joints = read.iter().zip(&q).zip(&speeds);
+        let at_rest = of_joints.map(|((read, q), speeds)| rests(read, q, speeds, *cutoff));
         let each = |value: &dyn Fn(&[f64], usize) -> f64| {
             let of = |q: &Vec<f64>| used.iter().map(|row| value(q, *row)).collect();
             q.iter().map(of).collect::<Vec<Vec<f64>>>()
         };
         Self {
-            directions: q.iter().zip(widths).map(direction).collect(),
+            directions: speeds.iter().zip(widths).map(direction).collect(),
+            rests: at_rest.map(|rests| smoothing.used_of(&rests)).collect(),
             qd: each(&|q, k| (q[k + 1] - q[k - 1]) / (2.0 * step_s)),
             qdd: each(&|q, k| (q[k + 1] - 2.0 * q[k] + q[k - 1]) / step_s.powi(2)),
             q: each(&|q, k| q[k]),
@@ -165,6 +171,15 @@ impl Smooth {
     pub fn rows(&self) -> usize {
         self.time.len()
     }
+}
+
+/// Half the difference of the values on either side of each row: at either end, that of the row beside it.
+pub(super) fn central_differences(channel: &[f64]) -> Vec<f64> {
+    let inner: Vec<f64> = (channel.windows(3))
+        .map(|three| 0.5 * (three[2] - three[0]))
+        .collect();
+    let ends = [inner.first(), inner.last()].map(|end| end.copied().unwrap_or(0.0));
+    [&ends[..1], &inner, &ends[1..]].concat()
 }
 
 /// The middle of the step after each row; the last one has the median length.

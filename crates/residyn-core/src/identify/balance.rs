@@ -1,7 +1,7 @@
 //! The torques that logged motions need, compared with those that act: windows of smoothed logs, one per lane.
 
 use super::normal_equations::{Reduced, WindowTerms};
-use super::sensitivity::{LANES, Lane, Tangent};
+use super::sensitivity::{LANES, Tangent};
 use super::sums::{Sums, loss};
 use super::values::Values;
 use crate::data::{Joint, Log, Smooth, Smoothing, row_from};
@@ -121,6 +121,14 @@ impl Balance {
         self.at.iter().flatten().flatten().count()
     }
 
+    /// The weight of a row's residual: none where the joint rests, since dry friction takes any torque there.
+    fn weight_at(&self, rows: &[Rows], lane: usize, at: usize, joint: usize) -> f64 {
+        match rows[self.logs[lane]].smooth.rests[joint][at] {
+            true => 0.0,
+            false => self.weight[joint],
+        }
+    }
+
     /// Evaluate a program at each row, calling `see(lanes, tape)`, where `lanes` gives each lane's row, if it has one.
     /// A program may take the slopes of the torques with respect to filter parameters before its parameters.
     fn over_rows<'d>(
@@ -167,9 +175,10 @@ impl Balance {
         let first = dynamics.layout().parameters_of_balance();
         self.over_rows(&dynamics.program, first, values, data, |lanes, tape| {
             for (lane, (_, residuals)) in all.iter_mut().enumerate() {
-                if lanes[lane].is_some() {
-                    let of_joint = |(j, weight): (usize, &f64)| tape.output(j)[lane] * weight;
-                    residuals.extend(self.weight.iter().enumerate().map(of_joint));
+                if let Some(at) = lanes[lane] {
+                    let weight = |joint| self.weight_at(data.0, lane, at, joint);
+                    let of_joint = |joint: usize| tape.output(joint)[lane] * weight(joint);
+                    residuals.extend((0..self.weight.len()).map(of_joint));
                 }
             }
         });
@@ -202,9 +211,12 @@ impl Balance {
         let mut sums: Vec<Sums> = tangent.columns_of.iter().map(of_joint).collect();
         let first = tangent.first_parameter;
         self.over_rows(&tangent.program, first, values, data, |lanes, tape| {
-            let of_joints = sums.iter_mut().zip(&self.weight).zip(tangent.slopes());
-            for (j, ((sums, weight), (_, slopes))) in of_joints.enumerate() {
-                let weight: Lane = Row(lanes.map(|at| at.map_or(0.0, |_| weight / scale)));
+            let of_joints = sums.iter_mut().zip(tangent.slopes());
+            for (j, (sums, (_, slopes))) in of_joints.enumerate() {
+                let weight = Row::from_fn(|lane| {
+                    let weight = |at| self.weight_at(data.0, lane, at, j) / scale;
+                    lanes[lane].map_or(0.0, weight)
+                });
                 let out = tape.output(j);
                 let residual = Row::from_fn(|l| out[l] * weight[l]);
                 sums.add(&residual, slopes.map(|output| tape.output(output)), &weight);

@@ -278,8 +278,9 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Standard deviation of a normal sample with the same median absolute value; never zero.
+/// Standard deviation of a normal sample with the same median absolute value, over the residuals that count; never zero.
 fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
-    let sizes: Vec<f64> = residuals.map(f64::abs).collect();
+    let counting = residuals.filter(|residual| *residual != 0.0);
+    let sizes: Vec<f64> = counting.map(f64::abs).collect();
     (SIGMA_PER_MAD * upper_median(&sizes)).max(1e-6)
 }

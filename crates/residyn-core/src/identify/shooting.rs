@@ -241,7 +241,8 @@ impl<'l> Shooting<'l> {
         self.windows.iter().map(guess).collect()
     }
 
-    /// Normalised residuals (model - log) / noise of every window: `[window][row * n + joint]`.
+    /// Normalised residuals (model - log) / noise of every window: `[window][row * n + joint]`. Those of torques at which
+    /// a joint rests do not count and are zero.
     pub fn residuals(
         &self,
         dynamics: &Dynamics,
@@ -283,9 +284,12 @@ impl<'l> Shooting<'l> {
         let residuals = self.residuals(dynamics, values, start_states);
         let shares = rms_by_joint(&residuals, dynamics.joints);
         let noise = self.noise.iter().zip(shares);
-        noise
-            .map(|(noise, share)| noise * share.max(1e-12))
-            .collect()
+        let left = |(noise, share): (&f64, f64)| match share > 0.0 {
+            true => noise * share.max(1e-12),
+            // No residual counts.
+            false => *noise,
+        };
+        noise.map(left).collect()
     }
 
     /// The Huber loss of each window at residual scale `scale`, including its start state; infinite if the model
@@ -364,7 +368,7 @@ impl<'l> Shooting<'l> {
     }
 }
 
-/// Root mean square of each joint's residuals, `[window][row * joints + joint]`.
+/// Root mean square of each joint's residuals, `[window][row * joints + joint]`; those that do not count are zero.
 pub(crate) fn rms_by_joint(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0_f64); joints];
     let rows = residuals
@@ -372,7 +376,10 @@ pub(crate) fn rms_by_joint(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
         .flat_map(|window| window.chunks_exact(joints));
     for row in rows {
         for (sum, residual) in sums.iter_mut().zip(row) {
-            *sum = (sum.0 + residual * residual, sum.1 + 1.0);
+            *sum = (
+                sum.0 + residual * residual,
+                sum.1 + f64::from(u8::from(*residual != 0.0)),
+            );
         }
     }
     let root = |(squares, rows): (f64, f64)| (squares / rows.max(1.0)).sqrt();

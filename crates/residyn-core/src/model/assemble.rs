@@ -8,7 +8,7 @@ use super::input_layout::InputLayout;
 use super::reader::Located;
 use super::system::{Model, Motion};
 use crate::data::{Joint, Quantity};
-use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
+use crate::expr::{Formula, Graph, Node, Op, Program, Scope, SignForm};
 
 impl Model {
     /// The equations and effects compiled into one program, with the model's own values and smoothing.
@@ -65,6 +65,19 @@ impl Model {
         let qdd = assembly.of_joints("qdd");
         assembly.directions = assembly.of_joints("direction");
         self.balanced(assembly, &qdd)
+    }
+
+    /// Which joints have dry friction, which takes any torque while they rest; none of a model without a torque balance.
+    pub fn dry_joints(&self) -> Vec<bool> {
+        let Some(balance) = self.smoothed_torque_balance() else {
+            return vec![false; self.joints];
+        };
+        let ops = balance.program.ops();
+        let is_read = |input: usize| {
+            let mut operands = ops.iter().flat_map(|op| op.operands());
+            operands.any(|node| matches!(ops[node.index()], Op::Input(at) if at as usize == input))
+        };
+        balance.layout().directions().map(is_read).collect()
     }
 
     fn balanced(&self, mut assembly: Assembly<'_>, qdd: &[Node]) -> Option<Dynamics> {

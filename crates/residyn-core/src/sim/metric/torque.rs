@@ -12,10 +12,11 @@ use crate::sim::Commands;
 /// Rows that are evaluated side by side.
 const LANES: usize = 8;
 
-/// The difference between the torques that a motion needs and those that act, over all rows of all logs.
+/// The difference between the torques that a motion needs and those that act, over all rows of all logs at which the
+/// joint does not rest in dry friction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TorqueError {
-    /// Root mean square of each joint, N m (or N).
+    /// Root mean square of each joint, N m (or N); zero for a joint of which no row counts.
     pub rms: Vec<f64>,
     /// The norm of all differences relative to that of all logged torques; infinite (null in files) if these are zero.
     #[serde(deserialize_with = "infinite_where_null")]
@@ -44,35 +45,79 @@ fn infinite_where_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Err
 /// Errors are taken as independent beyond this time, s.
 const STRETCH_S: f64 = 2.0;
 
-/// The torque error on logs, each smoothed by [`Smooth`]. `None` for a model that gives accelerations, and if no log is
-/// longer than a second.
+/// The torque error on logs, each smoothed by [`Smooth`]. Rows at which a joint rests do not count for it if it has dry
+/// friction. `None` for a model that gives accelerations, and if no log is longer than a second.
 pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
+    torque_error_with(model, logs, &model.dry_joints())
+}
+
+/// The same, with dry friction on the joints that are `dry`: errors of models that differ in friction are compared over
+/// the same rows.
+pub(crate) fn torque_error_with(model: &Model, logs: &[Log], dry: &[bool]) -> Option<TorqueError> {
     let balance = model.torque_balance()?;
-    let found = logs.par_iter().map(|log| differences(&balance, log));
-    let found: Vec<(Smooth, Vec<Vec<f64>>)> = found.collect();
-    let rows: usize = found.iter().map(|(logged, _)| logged.rows()).sum();
-    let squares = |channel: &Vec<f64>| channel.iter().map(|x| x * x).sum::<f64>();
-    let of_joint = |j: usize| -> f64 { found.iter().map(|(_, of)| squares(&of[j])).sum() };
-    let differences: Vec<f64> = (0..model.joints).map(of_joint).collect();
-    let of_torques = |logged: &Smooth| logged.tau.iter().map(squares).sum::<f64>();
-    let torques: f64 = found.iter().map(|(logged, _)| of_torques(logged)).sum();
+    let of_log = |log: &Log| {
+        let (logged, differences) = differences(&balance, log);
+        Squares::of(&logged, &differences, dry)
+    };
+    let found: Vec<Squares> = logs.par_iter().map(of_log).collect();
+    let rows: usize = found.iter().map(|of| of.rows).sum();
+    let sum = |j: usize| -> f64 { found.iter().map(|of| of.sums[j]).sum() };
+    let counted = |j: usize| -> usize { found.iter().map(|of| of.counted[j]).sum() };
+    let all: f64 = (0..model.joints).map(sum).sum();
+    let torques: f64 = found.iter().map(|of| of.torques).sum();
+    let relative = match torques > 0.0 {
+        true => (all / torques).sqrt(),
+        false => f64::INFINITY,
+    };
     (rows > 0).then(|| TorqueError {
-        rms: (differences.iter())
-            .map(|sum| (sum / rows as f64).sqrt())
+        rms: (0..model.joints)
+            .map(|j| (sum(j) / counted(j).max(1) as f64).sqrt())
             .collect(),
-        relative: (differences.iter().sum::<f64>() / torques).sqrt(),
-        blocks: found.iter().flat_map(blocks).collect(),
+        relative,
+        blocks: found.iter().flat_map(|of| of.blocks.clone()).collect(),
     })
 }
 
-/// The squares of the differences of all joints, summed over each [`STRETCH_S`] of a log.
-fn blocks((logged, differences): &(Smooth, Vec<Vec<f64>>)) -> Vec<f64> {
-    let start = logged.time.first().copied().unwrap_or(0.0);
-    let block = |row: &usize| ((logged.time[*row] - start) / STRETCH_S).floor();
-    let square = |row: &usize| differences.iter().map(|of| of[*row].powi(2)).sum::<f64>();
-    let rows: Vec<usize> = (0..logged.rows()).collect();
-    let blocks = rows.chunk_by(|a, b| block(a) == block(b));
-    blocks.map(|rows| rows.iter().map(square).sum()).collect()
+/// Sums over the rows of a log that count.
+struct Squares {
+    rows: usize,
+    /// Of the differences of each joint, over this many rows.
+    sums: Vec<f64>,
+    counted: Vec<usize>,
+    /// Of the logged torques of all joints.
+    torques: f64,
+    /// Of the differences of all joints, over each [`STRETCH_S`].
+    blocks: Vec<f64>,
+}
+
+impl Squares {
+    fn of(logged: &Smooth, differences: &[Vec<f64>], dry: &[bool]) -> Self {
+        let counts = |joint: usize, row: usize| !(dry[joint] && logged.rests[joint][row]);
+        let joints = 0..differences.len();
+        let rows: Vec<usize> = (0..logged.rows()).collect();
+        let of_joint = |of: &[f64], joint: usize, rows: &[usize]| -> f64 {
+            let counting = rows.iter().filter(|row| counts(joint, **row));
+            counting.map(|row| of[*row].powi(2)).sum()
+        };
+        let of_all = |channels: &[Vec<f64>], rows: &[usize]| -> f64 {
+            let of_each = channels.iter().enumerate();
+            of_each.map(|(joint, of)| of_joint(of, joint, rows)).sum()
+        };
+        let start = logged.time.first().copied().unwrap_or(0.0);
+        let block = |row: &usize| ((logged.time[*row] - start) / STRETCH_S).floor();
+        let blocks = rows.chunk_by(|a, b| block(a) == block(b));
+        Self {
+            rows: rows.len(),
+            sums: (joints.clone())
+                .map(|joint| of_joint(&differences[joint], joint, &rows))
+                .collect(),
+            counted: joints
+                .map(|joint| rows.iter().filter(|row| counts(joint, **row)).count())
+                .collect(),
+            torques: of_all(&logged.tau, &rows),
+            blocks: blocks.map(|rows| of_all(differences, rows)).collect(),
+        }
+    }
 }
 
 /// Another kind of torques than held ones leaves at most this share of their error.
@@ -171,4 +216,103 @@ pub(crate) fn balance_of(balance: &Dynamics, acting: &Smooth) -> Vec<Vec<f64>> {
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{balance_of, torque_error, torque_error_with};
+    use crate::data::{Joint, Log, Smooth, TorqueColumn};
+    use crate::identify::{LevenbergMarquardt, fit_torques};
+    use crate::model::{FittedEffect, Library, Model};
+
+    /// N m
+    const LEVEL: f64 = 1.0;
+
+    fn acrobot(level: f64) -> Model {
+        let library = Library::built_in();
+        let coulomb = library.effect("coulomb_friction").unwrap();
+        let mut friction = FittedEffect::absent(coulomb, Joint::at(1));
+        friction.values[0].0 = level;
+        let model = library.model("acrobot").unwrap();
+        model
+            .with_effects(vec![friction])
+            .with_smoothing_velocities(vec![1e-3; 2])
+    }
+
+    /// Angle, velocity and acceleration of a joint that swings out and back for a second, and rests for two.
+    fn now_and_then(time: f64) -> [f64; 3] {
+        let (phase, w) = (time % 3.0, std::f64::consts::TAU);
+        if phase >= 1.0 {
+            return [0.0; 3];
+        }
+        let (sin, cos) = (w * phase).sin_cos();
+        let (u, du, ddu) = (1.0 - cos, w * sin, w * w * cos);
+        [u * u, 2.0 * u * du, 2.0 * (du * du + u * ddu)].map(|x| 0.2 * x)
+    }
+
+    /// Joint 1 swings, joint 2 does now and then; while it rests, friction holds it against a torque.
+    fn log() -> Log {
+        let time: Vec<f64> = (0..6000).map(|row| 0.005 * f64::from(row)).collect();
+        let swing = |t: f64| {
+            [
+                (2.0 * t).sin(),
+                2.0 * (2.0 * t).cos(),
+                -4.0 * (2.0 * t).sin(),
+            ]
+        };
+        let channel = |k: usize| -> Vec<Vec<f64>> {
+            let first = time.iter().map(|t| swing(*t)[k]).collect();
+            vec![first, time.iter().map(|t| now_and_then(*t)[k]).collect()]
+        };
+        let motion = Smooth {
+            q: channel(0),
+            qd: channel(1),
+            qdd: channel(2),
+            tau: vec![vec![0.0; time.len()]; 2],
+            directions: Vec::new(),
+            rests: Vec::new(),
+            time: time.clone(),
+        };
+        let mut tau = balance_of(&acrobot(LEVEL).torque_balance().unwrap(), &motion);
+        for (tau, t) in tau[1].iter_mut().zip(&time) {
+            if now_and_then(*t)[1] == 0.0 {
+                *tau += 0.9 * LEVEL;
+            }
+        }
+        Log {
+            q: motion.q,
+            qd: motion.qd,
+            tau,
+            time,
+            ..Log::empty(2).with_torques(TorqueColumn::Sampled)
+        }
+    }
+
+    #[test]
+    fn rows_at_rest_do_not_count_for_a_joint_with_dry_friction() {
+        let (model, logs) = (acrobot(LEVEL), [log()]);
+        assert_eq!(model.dry_joints(), [false, true]);
+        let counted = torque_error(&model, &logs).unwrap();
+        let all = torque_error_with(&model, &logs, &[false; 2]).unwrap();
+        // What is left stems from the low pass, about each reversal and rest.
+        assert!(counted.rms[1] < 0.7 * all.rms[1], "{counted:?}, {all:?}");
+        assert!(counted.relative < 0.5 * all.relative);
+        // Joint 1 has none, and so has a model without this effect.
+        assert_eq!(counted.rms[0], all.rms[0]);
+        let plain = model.with_effects(Vec::new());
+        assert_eq!(plain.dry_joints(), [false; 2]);
+    }
+
+    #[test]
+    fn a_fit_to_torques_learns_nothing_from_a_joint_at_rest() {
+        let (start, logs) = (acrobot(0.3), [log()]);
+        let found = fit_torques(&LevenbergMarquardt::USUAL, &start, &start, &logs).unwrap();
+        let level = found.model.effects[0].values[0].0;
+        assert!((level / LEVEL - 1.0).abs() < 0.05, "{level}");
+        assert!(
+            found.shooting.noise[1] < 0.5 * LEVEL,
+            "{:?}",
+            found.shooting.noise
+        );
+    }
 }
