@@ -5,8 +5,9 @@ use super::judge::Found;
 use super::problem::Problem;
 use super::refine::Refined;
 use super::score::Errors;
-use crate::digits::amount_of;
+use crate::digits::{rounded, with_unit};
 use crate::identify::Identifiability;
+use crate::model::Parameter;
 use schemars::JsonSchema;
 
 /// The answer in one word.
@@ -32,7 +33,9 @@ pub(super) fn verdict(
     errors: &Errors,
 ) -> (Verdict, String) {
     let (verdict, reason) = concluded(found, refined, errors);
-    let far = far_from_declared(&found.problem, refined);
+    let far = (found.problem.moves())
+        .then(|| far_from_declared(&found.problem, refined))
+        .flatten();
     let reasons = far
         .into_iter()
         .chain([reason])
@@ -104,7 +107,9 @@ fn far_from_declared(problem: &Problem<'_>, refined: &Refined<'_>) -> Option<Str
         });
     let far: Vec<String> = far
         .map(|(declared, fitted)| {
-            let [was, is] = [declared, fitted].map(|of| amount_of(of.value, None, &of.unit));
+            let amount =
+                |of: &Parameter| with_unit(rounded(of.value, 0.01 * of.value.abs()), &of.unit);
+            let [was, is] = [declared, fitted].map(amount);
             format!("{} is fitted at {is}, declared as {was}", fitted.name)
         })
         .collect();
