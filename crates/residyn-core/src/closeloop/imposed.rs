@@ -42,13 +42,13 @@ impl Problem<'_> {
         let dynamics = self.first.as_ref()?.model.dynamics();
         let errors = errors_in(&dynamics, self.logs, &windows, self.shooting.longest_s());
         let driven: f64 = errors.iter().flat_map(|error| &error.position).sum();
-        let uniform = |window: &Window| self.from_uniform_motion(window);
+        let uniform = |window: &Window| self.beyond_uniform_motion(window);
         let uniform: f64 = windows.iter().filter_map(uniform).sum();
         Some((driven / uniform).sqrt())
     }
 
     /// Squares of the distance from a motion that goes on as the window begins, summed over rows and joints.
-    fn from_uniform_motion(&self, window: &Window) -> Option<f64> {
+    fn beyond_uniform_motion(&self, window: &Window) -> Option<f64> {
         let log = &self.logs[window.log];
         let start = initial_state(log, half_width_s(log.median_step()), window.first)?;
         let (angles, velocities) = start.split_at(log.q.len());
