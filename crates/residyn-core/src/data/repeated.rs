@@ -6,8 +6,10 @@ use super::examined::at_examined;
 use super::jumps::interpolated;
 use super::log::Log;
 use super::signal::resolution;
+use super::statistics::{SIGMA_PER_MAD, mad};
 
-/// A joint that moves by fewer steps of its encoder from row to row may not have been seen to move.
+/// A joint that moves by fewer steps of its encoder, or deviations of its noise, from row to row may not have been seen
+/// to move: rounding and noise make equal readings there by chance.
 const VISIBLE_STEPS: f64 = 3.0;
 
 /// Readings before and after that show how fast the joint moves.
@@ -22,6 +24,9 @@ const MOST_ROWS: usize = 10;
 
 /// With a larger share of repeated rows in motion, the log is written faster than its source is read: another finding.
 const MANY: f64 = 0.2;
+
+/// The gain of white noise's variance in third differences.
+const THIRD_GAIN: f64 = 20.0;
 
 impl Log {
     /// The log with repeated readings masked and interpolated between the fresh ones, and the rows that repeat. What
@@ -65,7 +70,8 @@ fn repeated_rows(log: &Log, fresh: &[usize]) -> Vec<usize> {
     if fresh.len() == log.rows() {
         return vec![];
     }
-    let visible = |q: &Vec<f64>| VISIBLE_STEPS * resolution(&at_examined(q));
+    let visible =
+        |q: &Vec<f64>| VISIBLE_STEPS * resolution(&at_examined(q)).max(fresh_noise(q, fresh));
     let visible: Vec<f64> = log.q.iter().map(visible).collect();
     let moves = |at: &usize| {
         let mut joints = log.q.iter().zip(&visible);
@@ -80,6 +86,17 @@ fn repeated_rows(log: &Log, fresh: &[usize]) -> Vec<usize> {
         true => vec![],
         false => repeated,
     }
+}
+
+/// Standard deviation of white noise on an angle, from its third differences: over rows that are all fresh, as the jump
+/// after a repetition is no noise. An upper bound if the rows are far apart relative to the motion.
+fn fresh_noise(q: &[f64], fresh: &[usize]) -> f64 {
+    let is_unbroken = |rows: &&[usize]| rows[4] - rows[0] == 4;
+    let third = |rows: &[usize]| {
+        (q[rows[4]] - 3.0 * q[rows[3]] + 3.0 * q[rows[2]] - q[rows[1]]) / THIRD_GAIN.sqrt()
+    };
+    let unbroken = fresh.windows(5).filter(is_unbroken);
+    SIGMA_PER_MAD * mad(&unbroken.map(third).collect::<Vec<f64>>())
 }
 
 /// Whether an angle moves on from one fresh reading to the next as it does before and after, and visibly.
@@ -142,6 +159,19 @@ mod tests {
             assert!((mended.q[0][row] - exact.q[0][row]).abs() < 3e-4, "{row}");
             assert!((mended.qd[0][row] - exact.qd[0][row]).abs() < 1e-3, "{row}");
         }
+    }
+
+    #[test]
+    fn noise_larger_than_the_steps_of_the_encoder_makes_no_repetition() {
+        // Equal readings by chance in some 3 % of the rows; the joint moves by 0.02 rad a row at most.
+        let mut log = swing(1e-3);
+        let mut state = 1_u32;
+        for q in &mut log.q[0] {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *q += f64::from(state >> 16) % 41.0 * 1e-3;
+        }
+        assert!(fresh_rows(&log).len() < 990);
+        assert!(log.without_repeats().1.is_empty());
     }
 
     #[test]

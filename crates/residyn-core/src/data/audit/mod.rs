@@ -40,8 +40,8 @@ use super::statistics::{deviation, median};
 
 /// Measures the quality of a log that was read from these columns.
 ///
-/// The numbers are those of the log as it was read, without repeated readings. If columns hold something other than was asked for, the first
-/// findings say so, and the others are about the log as it is meant.
+/// The numbers are those of the log as it was read, without repeated readings. If columns hold something other than was
+/// asked for, the first findings say so, and the others are about the log as it is meant.
 ///
 /// Works on any log that [`Log::of_table`] returns; quantities that need more rows or more motion than
 /// the log has are `None` or 0, as their documentation says.
