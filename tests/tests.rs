@@ -49,6 +49,7 @@ mod published_parameters;
 mod recipes;
 mod reference_models;
 mod relative_paths;
+mod repeated_readings;
 mod runs;
 mod shell;
 mod slow;

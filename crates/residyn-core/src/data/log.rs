@@ -68,8 +68,8 @@ pub struct Log {
     pub driven_by: Quantity,
     /// What these are: held from row to row, readings at the rows, or means.
     pub torque: TorqueColumn,
-    /// Rows whose angle jumps and is not to be fitted, `[joint]`, in ascending order. The angle there is interpolated
-    /// from the rows around. May be empty: none in a log as it is read.
+    /// Rows whose angle jumps, or repeats a reading, and is not to be fitted, `[joint]`, in ascending order. The angle
+    /// there is interpolated from the rows around. May be empty: none in a log as it is read.
     pub masked: Vec<Vec<usize>>,
     /// Rows inserted where the logger dropped some, in ascending order: all their channels are interpolated from the
     /// rows around. None in a log as it is read.
@@ -145,12 +145,13 @@ impl Log {
         self.filled.get(first).is_none_or(|row| row > rows.end())
     }
 
-    /// The log as fits read it: readings that jump are masked, and rows that the logger dropped are filled in, or left
-    /// out with the windows of `window_s` around them.
+    /// The log as fits read it: readings that jump or repeat those before are masked, and rows that the logger dropped
+    /// are filled in, or left out with the windows of `window_s` around them.
     #[must_use]
     pub fn for_fits(&self, window_s: f64) -> Log {
-        let jumps: Vec<Vec<usize>> = self.q.iter().map(|q| rows_that_jump(q)).collect();
-        self.without(&jumps).into_owned().completed(window_s)
+        let (log, _) = self.without_repeats();
+        let jumps: Vec<Vec<usize>> = log.q.iter().map(|q| rows_that_jump(q)).collect();
+        log.without(&jumps).into_owned().completed(window_s)
     }
 
     /// The log with angles masked at these rows, at which they jump, `[joint]`.

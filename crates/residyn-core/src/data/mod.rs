@@ -25,6 +25,7 @@ mod log;
 mod low_pass;
 mod projection;
 mod read;
+mod repeated;
 mod signal;
 mod smooth;
 mod standstill;

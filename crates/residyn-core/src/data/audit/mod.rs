@@ -28,7 +28,6 @@ pub use quality::{Audit, Finding, Remedy, Severity};
 pub use repeats::{Repeated, report_repeats};
 pub use response::Response;
 
-use std::borrow::Cow;
 use std::ops::Range;
 
 use self::misread::Reading;
@@ -41,8 +40,8 @@ use super::statistics::{deviation, median};
 
 /// Measures the quality of a log that was read from these columns.
 ///
-/// The numbers are those of the log as it was read. If columns hold something other than was asked for, the first
-/// findings say so, and the others are about the log as it is meant.
+/// The numbers are those of the log as it was read, without repeated readings. If columns hold something other than was
+/// asked for, the first findings say so, and the others are about the log as it is meant.
 ///
 /// Works on any log that [`Log::of_table`] returns; quantities that need more rows or more motion than
 /// the log has are `None` or 0, as their documentation says.
@@ -66,14 +65,16 @@ pub fn audit_together<'l>(
 
 /// The audit of a log by itself.
 fn of_log(log: &Log, columns: &Columns) -> Audit {
-    let read = Reading::of(Cow::Borrowed(log));
+    let (mended, repeated) = log.without_repeats();
+    let read = Reading::of(mended);
     let (meant, misread) = misread::as_meant(&read, columns);
     let mut audit = measured(log, read.joints);
     let findings = match meant {
         Some(Reading { log, joints, .. }) => findings::of(&measured(&log, joints), &log),
-        None => findings::of(&audit, log),
+        None => findings::of(&audit, &read.log),
     };
-    audit.findings = [misread, findings].concat();
+    let repeated = findings::repeated_readings(log, &repeated);
+    audit.findings = [misread, findings, Vec::from_iter(repeated)].concat();
     audit.findings.sort_by_key(|finding| finding.severity);
     audit
 }

@@ -6,6 +6,8 @@ mod drive;
 mod velocity;
 mod whole;
 
+pub(super) use whole::repeated_readings;
+
 use super::joint::JointAudit;
 use super::quality::{Audit, Finding, Severity};
 use super::table::short;

@@ -3,7 +3,8 @@
 use super::Severity::{Info, Serious, Warning};
 use super::{Finding, JointAudit, Seen, milliseconds, percent, short};
 use crate::data::dropped::dropped;
-use crate::data::log::Interval;
+use crate::data::log::{Interval, Log};
+use crate::data::repeated::longest_run;
 
 /// Motion for less than this \[s\] is fewer than eight intervals of half a second, too few to distinguish effects.
 const LITTLE_MOTION_S: f64 = 4.0;
@@ -61,6 +62,21 @@ pub(super) fn dropped_rows(seen: &Seen<'_>) -> Option<Finding> {
     let severity = if share > FEW_DROPPED { Warning } else { Info };
     let steps = dropped(seen.log).into_iter().map(|step| step.row);
     Some(Finding::new(severity, text).during(&seen.log.intervals(steps)))
+}
+
+/// These rows repeat the readings of the row before.
+pub(in super::super) fn repeated_readings(log: &Log, rows: &[usize]) -> Option<Finding> {
+    let share = rows.len() as f64 / log.rows() as f64;
+    let text = format!(
+        "all angles repeat the row before in {} row(s) in motion ({} of the rows, up to {} in a row) and then jump: the \
+         bus answered with its last readings. Masked in fits, counted in errors on test logs",
+        rows.len(),
+        percent(share),
+        longest_run(rows)
+    );
+    let severity = if share > FEW_DROPPED { Warning } else { Info };
+    let finding = || Finding::new(severity, text).during(&log.intervals(rows.iter().copied()));
+    (!rows.is_empty()).then(finding)
 }
 
 pub(super) fn jitter(seen: &Seen<'_>) -> Option<Finding> {
