@@ -51,14 +51,21 @@ impl LevenbergMarquardt {
 impl Solver for LevenbergMarquardt {
     fn solve(&self, search: &mut Search<'_>) -> Termination {
         let mut damping = self.first_damping;
+        let mut gain = 1.0;
         while search.steps() < self.most_steps {
+            let before = search.cost();
             let termination = self.step(search, &mut damping);
             search.end_step();
             if let Some(termination) = termination {
                 return termination;
             }
+            gain = (before - search.cost()) / before.max(f64::MIN_POSITIVE);
         }
-        Termination::StepLimit
+        // In a long valley the last steps may lower the cost by less than models can differ by.
+        match gain <= self.enough_to_compare {
+            true => Termination::SmallDecrease,
+            false => Termination::StepLimit,
+        }
     }
 }
 
