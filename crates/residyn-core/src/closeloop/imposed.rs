@@ -3,21 +3,42 @@
 
 use super::problem::Problem;
 use super::select::usual_forces;
-use crate::data::half_width_s;
 use crate::data::statistics::sample_deviation;
+use crate::data::{Smooth, half_width_s};
 use crate::identify::{Window, cut, fit_torques, initial_state};
-use crate::sim::metric::errors_in;
+use crate::model::Dynamics;
+use crate::sim::metric::{balance_of, errors_in};
 
 impl Problem<'_> {
-    /// Whether the motion explains most of each joint's torque, while the torques explain far less of the motion: a
-    /// bench moves the rig, and a sensor measures what that takes. Never without a first optimum or without torques.
+    /// Whether the motion explains most of each joint's torque, while the declared inertia takes next to nothing of it, or
+    /// the torques explain far less of the motion: a bench moves the rig, and a sensor measures what that takes. Never
+    /// without a first optimum or without torques.
     pub(super) fn is_imposed(&self) -> bool {
         let left = self.first.as_ref().and_then(|_| self.left_of_torques());
         let settings = &self.settings.fit;
         left.is_some_and(|torque| {
             torque < settings.imposed_torque_share
-                && self.left_of_motion() > Some(settings.imposed_motion * torque)
+                && (self.share_of_inertia() < Some(settings.imposed_inertia)
+                    || self.left_of_motion() > Some(settings.imposed_motion * torque))
         })
+    }
+
+    /// What accelerating the declared model takes of the torques' standard deviation, on the joint on which it takes
+    /// most; `None` if torques cannot be compared.
+    fn share_of_inertia(&self) -> Option<f64> {
+        let balance = self.declared.with_effects(Vec::new()).torque_balance()?;
+        let logs: Vec<Smooth> = self.logs.iter().map(Smooth::of).collect();
+        let inertial: Vec<Vec<Vec<f64>>> = logs
+            .iter()
+            .map(|log| inertial_torques(&balance, log))
+            .collect();
+        let share = |joint: usize| {
+            let inertial = inertial.iter().flat_map(|of| &of[joint]).copied();
+            let torque = logs.iter().flat_map(|log| &log.tau[joint]).copied();
+            let [inertial, torque]: [Vec<f64>; 2] = [inertial.collect(), torque.collect()];
+            sample_deviation(&inertial) / sample_deviation(&torque)
+        };
+        (0..self.declared.joints).map(share).max_by(f64::total_cmp)
     }
 
     /// What the declared model with the usual forces, fitted to the torques, leaves of their standard deviation on the
@@ -63,4 +84,25 @@ impl Problem<'_> {
         };
         Some(log.q.iter().enumerate().map(of_joint).sum())
     }
+}
+
+/// What a motion takes beyond the same motion without acceleration, `[joint][row]`.
+fn inertial_torques(balance: &Dynamics, moving: &Smooth) -> Vec<Vec<f64>> {
+    let none = vec![vec![0.0; moving.rows()]; moving.q.len()];
+    let moving = Smooth {
+        tau: none.clone(),
+        ..moving.clone()
+    };
+    let steady = Smooth {
+        qdd: none,
+        ..moving.clone()
+    };
+    let [with, without] = [moving, steady].map(|of| balance_of(balance, &of));
+    let beyond = |(with, without): (&Vec<f64>, &Vec<f64>)| {
+        with.iter()
+            .zip(without)
+            .map(|(with, without)| with - without)
+            .collect()
+    };
+    with.iter().zip(&without).map(beyond).collect()
 }

@@ -123,6 +123,9 @@ settings! {
         /// If a motion is imposed on the rig, it explains the torques: the declared model with the usual forces leaves
         /// less than this share of their standard deviation, a tenth of their variance.
         imposed_torque_share: f64 = 0.316,
+        /// A motion is imposed if accelerating the declared model takes less than this share of the torques: an inertia a
+        /// tenth of the true one would still take more on a rig that its torques move.
+        imposed_inertia: f64 = 0.02,
         /// A motion is imposed if the torques leave, of its distance from a uniform motion, more than this many times
         /// the share that it leaves of the torques. On a rig moved by its torques they leave a tenth of that.
         imposed_motion: f64 = 2.0,
