@@ -31,7 +31,13 @@ fn a_bench_in_shards_has_the_summary_of_one_machine() {
     let scratch = Scratch::new();
     let line = "bench effects --grid $REPO/configs/bench/smoke.toml";
     in_shards_and_whole(&scratch, line, 2);
-    let summary = |out: &str| read(&scratch.path(out).join("summary.json"), &["/seconds"]);
+    let summary = |out: &str| {
+        let mut summary = read(&scratch.path(out).join("summary.json"), &["/seconds"]);
+        for part in summary["parts"].as_array_mut().unwrap() {
+            assert_ne!(part["seconds"].take(), serde_json::Value::Null);
+        }
+        summary
+    };
     assert_eq!(summary("merged"), summary("whole"));
     let cells = scratch.read("merged/cells.jsonl");
     assert_eq!(cells.lines().count(), 3, "nothing was done twice");
