@@ -2,7 +2,7 @@
 
 use super::fit::NOTHING;
 use super::problem::Problem;
-use super::select::baseline_friction;
+use super::select::{baseline_friction, usual_forces};
 use crate::data::Log;
 use crate::data::statistics::{mean, upper_median};
 use crate::identify::{Window, cut, fit_torques};
@@ -44,12 +44,26 @@ impl Problem<'_> {
         Some(self.motion_error(&by_motion.fitted.model)? >= far)
     }
 
+    /// A few windows, spread evenly over the logs.
+    pub(super) fn some_windows(&self) -> Vec<Window> {
+        let windows = cut(self.logs, self.settings.fit.window_s);
+        let every = windows.len().div_ceil(self.settings.fit.sample_windows);
+        windows.into_iter().step_by(every.max(1)).collect()
+    }
+
+    /// What the declared model with the usual forces, fitted to the torques, leaves of each joint's; `None` if torques
+    /// cannot be compared.
+    pub(super) fn torques_left(&self) -> Option<Vec<f64>> {
+        let effects = [self.declared.effects.as_slice(), &usual_forces(self)].concat();
+        let model = self.smoothed(&self.declared.with_effects(effects));
+        let fitted = fit_torques(self.solver, &model, self.declared, self.logs).ok()?;
+        Some(fitted.shooting.noise)
+    }
+
     /// The open-loop error of a model over a few windows of its logs, as a share of how far the joints move in them,
     /// over the joints that move at all; `None` if none does.
     fn motion_error(&self, model: &Model) -> Option<f64> {
-        let windows = cut(self.logs, self.settings.fit.window_s);
-        let every = windows.len().div_ceil(self.settings.fit.sample_windows);
-        let windows: Vec<Window> = windows.into_iter().step_by(every.max(1)).collect();
+        let windows = self.some_windows();
         let errors = errors_in(&model.dynamics(), self.logs, &windows, FIT_S);
         let share = |j: usize| {
             let way = |window: &Window| way(&self.logs[window.log], window, j);

@@ -2,10 +2,9 @@
 //! force.
 
 use super::problem::Problem;
-use super::select::usual_forces;
 use crate::data::statistics::sample_deviation;
 use crate::data::{Smooth, half_width_s};
-use crate::identify::{Window, cut, fit_torques, initial_state};
+use crate::identify::{Window, initial_state};
 use crate::model::Dynamics;
 use crate::sim::metric::{balance_of, errors_in};
 
@@ -44,22 +43,18 @@ impl Problem<'_> {
     /// What the declared model with the usual forces, fitted to the torques, leaves of their standard deviation on the
     /// joint on which it leaves most; `None` if torques cannot be compared.
     fn left_of_torques(&self) -> Option<f64> {
-        let effects = [self.declared.effects.as_slice(), &usual_forces(self)].concat();
-        let model = self.smoothed(&self.declared.with_effects(effects));
-        let fitted = fit_torques(self.solver, &model, self.declared, self.logs).ok()?;
+        let left = self.torques_left()?;
         let share = |(joint, left): (usize, &f64)| {
             let torque = self.logs.iter().flat_map(|log| &log.tau[joint]);
             left / sample_deviation(&torque.copied().collect::<Vec<f64>>())
         };
-        let shares = fitted.shooting.noise.iter().enumerate().map(share);
+        let shares = left.iter().enumerate().map(share);
         shares.max_by(f64::total_cmp)
     }
 
     /// What the first optimum leaves of the distance from a motion that goes on as each window begins.
     fn left_of_motion(&self) -> Option<f64> {
-        let windows = cut(self.logs, self.settings.fit.window_s);
-        let every = windows.len().div_ceil(self.settings.fit.sample_windows);
-        let windows: Vec<Window> = windows.into_iter().step_by(every.max(1)).collect();
+        let windows = self.some_windows();
         let dynamics = self.first.as_ref()?.model.dynamics();
         let errors = errors_in(&dynamics, self.logs, &windows, self.shooting.longest_s());
         let driven: f64 = errors.iter().flat_map(|error| &error.position).sum();

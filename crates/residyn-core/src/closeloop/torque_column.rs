@@ -9,7 +9,6 @@ use super::select::usual_forces;
 use crate::data::statistics::mean;
 use crate::data::torque_column::share_of_held;
 use crate::data::{Finding, Log, Quantity, Severity, TorqueColumn};
-use crate::identify::fit_torques;
 
 /// The torques of all logs are of one kind, and this many logs suffice to show which.
 const FEW: usize = 3;
@@ -97,10 +96,7 @@ impl Problem<'_> {
     /// What the same model leaves of the torques: the geometric mean over the joints. `None` if
     /// it gives accelerations, or diverges.
     fn torque_noise(&self) -> Option<f64> {
-        let effects = [self.declared.effects.as_slice(), &usual_forces(self)].concat();
-        let model = self.smoothed(&self.declared.with_effects(effects));
-        let found = fit_torques(self.solver, &model, self.declared, self.logs).ok()?;
-        let noise = found.shooting.noise.iter().map(|noise| noise.ln());
-        Some(mean(&noise.collect::<Vec<f64>>()).exp())
+        let logarithms = self.torques_left()?.into_iter().map(f64::ln);
+        Some(mean(&logarithms.collect::<Vec<f64>>()).exp())
     }
 }
