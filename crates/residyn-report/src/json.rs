@@ -302,6 +302,7 @@ fn errors(outcome: &Outcome) -> ErrorEntry {
         hybrid: errors.hybrid.as_ref().map(model),
         against: errors.against.iter().map(contender).collect(),
         reduction_ci95: errors.reduction_ci95,
+        noise_floor: errors.noise_floor,
         by_log: errors.by_log.clone(),
         integrator_step_s: errors.before.step_s.min(errors.after.step_s),
     }

@@ -333,6 +333,9 @@ pub(super) struct ErrorEntry {
     pub against: Vec<ContenderEntry>,
     /// 95 % interval of the relative reduction of the position error, before to after; null if there are too few logs
     pub reduction_ci95: Option<[f64; 2]>,
+    /// the position error of all joints together at the middle horizon that the noise of the position sensors accounts
+    /// for, in the rows and in the states from which predictions start; null if torques are compared
+    pub noise_floor: Option<f64>,
     /// the errors that are compared, on each test log; empty for a single log
     pub by_log: Vec<TestLog>,
     /// the shorter of the integrator steps of the declared model and the model with effects, s

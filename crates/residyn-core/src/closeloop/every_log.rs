@@ -1,10 +1,13 @@
-//! Whether an effect makes the torques of every log fit better. An effect that fits the torques best overall may
-//! imitate a part of another effect, and then it helps on one log and harms on the next.
+//! Whether an effect makes every log fit better. An effect that fits best overall may imitate a part of another effect,
+//! and then it helps on one log and harms on the next.
 
 use super::establish::Standing;
 use super::fitted::Fitted;
+use super::problem::Problem;
+use super::select::is_worse;
+use super::settings::SelectSettings;
 use crate::data::Log;
-use crate::sim::metric::torque_error_with;
+use crate::sim::metric::{errors_in, torque_error_with, windows};
 
 /// Torque errors of a model on each of some logs.
 pub(super) struct EveryLog<'l> {
@@ -40,6 +43,39 @@ impl<'l> EveryLog<'l> {
         };
         let found = self.errors.iter().find(|of_log| !helps(of_log));
         found.map(|(log, _)| *log)
+    }
+}
+
+/// Open-loop errors of a model on logs to which nothing is fitted.
+pub(super) struct SetApart {
+    /// Squares of each window of the middle horizon, all joints together, log by log.
+    squares: Vec<Vec<f64>>,
+}
+
+impl SetApart {
+    pub fn of(problem: &Problem<'_>, fitted: &Fitted, logs: &[Log]) -> Self {
+        let dynamics = fitted.model.dynamics();
+        let (horizon_s, step_s) = (
+            problem.settings.score.middle_s(),
+            problem.shooting.longest_s(),
+        );
+        let of_log = |log: &Log| {
+            let log = std::slice::from_ref(log);
+            let errors = errors_in(&dynamics, log, &windows(0, &log[0], horizon_s), step_s);
+            errors
+                .iter()
+                .map(|error| error.position.iter().sum())
+                .collect()
+        };
+        Self {
+            squares: logs.iter().map(of_log).collect(),
+        }
+    }
+
+    /// The first log whose error exceeds another model's by more than chance and rounding.
+    pub fn worse_than(&self, other: &Self, settings: &SelectSettings) -> Option<usize> {
+        let mut logs = self.squares.iter().zip(&other.squares);
+        logs.position(|(own, other)| is_worse(own, other, settings))
     }
 }
 

@@ -1,20 +1,23 @@
 //! Stage 3: fit the declared model.
 
 use std::collections::BTreeSet;
+use std::iter;
 use std::sync::{Arc, LazyLock};
+
+use rayon::prelude::*;
 
 use super::error::StudyError;
 use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::prepare::Prepared;
-use super::problem::Problem;
+use super::problem::{Problem, Sample};
 use super::select::{baseline_friction, usual_forces};
 use super::smoothing::width;
 use super::stage::{Stage, Watch};
-use super::start::around;
+use super::start::{around, spread};
 use crate::identify::{
-    FitError, Identifiability, Open, Shooting, Values, cut, fit_by, fit_torques, identifiability,
-    longest_stable_step, open, uncertainty,
+    Fit, FitError, Identifiability, Open, Shooting, Values, as_it_stands, cut, fit_by, fit_roughly,
+    fit_torques, identifiability, longest_stable_step, open, uncertainty,
 };
 use crate::model::{FittedEffect, Library, Model};
 
@@ -113,7 +116,7 @@ impl<'a> Problem<'a> {
     fn near_first_optimum(&self, start: &Model) -> Self {
         let forces = usual_forces(self);
         let is_motion = self.error_model == ErrorModel::OutputError && !forces.is_empty();
-        let first = is_motion.then(|| self.fitted_beside(start, &forces).ok());
+        let first = is_motion.then(|| self.best_beside(start, &forces).ok());
         Self {
             first: first.flatten().map(Arc::new),
             ..self.clone()
@@ -179,9 +182,10 @@ impl<'a> Problem<'a> {
         Some((start, found))
     }
 
-    /// The declared model, fitted from these values and from a first optimum.
+    /// The declared model, fitted from values at which it does not diverge and from a first optimum.
     fn fitted_from(&self, start: &Model, first: Option<&Fitted>) -> Result<ByMotion, FitError> {
-        let alone = self.fitted_beside(start, &[]).map(|alone| {
+        self.evaluated_over(&self.windows_of(self.settings.fit.short_window_s), start)?;
+        let alone = self.best_beside(start, &[]).map(|alone| {
             let identifiability = self.identifiability_of(&alone);
             (alone, identifiability)
         });
@@ -195,11 +199,18 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The declared model with baseline friction on every joint, fitted from the starting values of the declared one;
-    /// `None` if it diverges.
+    /// The declared model with baseline friction on every joint, fitted from the first optimum or, without one, from the
+    /// starting values of the declared model; `None` if it diverges.
     pub(super) fn with_usual_friction(&self) -> Option<Fitted> {
-        let friction = baseline_friction(self);
-        self.fitted_beside(&self.started_from(), &friction).ok()
+        let friction = self.at_first_optimum(baseline_friction(self));
+        match &self.first {
+            Some(first) => {
+                let own = &first.model.effects[..self.declared.effects.len()];
+                let model = first.model.with_effects([own, &friction].concat());
+                self.fitted_over(&self.shooting, &model).ok()
+            }
+            None => self.fitted_beside(&self.started_from(), &friction).ok(),
+        }
     }
 
     /// The declared model with these effects, fitted from these values: over short windows, then over the problem's
@@ -212,8 +223,8 @@ impl<'a> Problem<'a> {
         let short = self.windows_of(self.settings.fit.short_window_s);
         let own = &self.declared.effects;
         let model = start.with_effects([own.as_slice(), effects].concat());
-        let first = self.fitted_over(&short, &model)?;
-        self.fitted_over(&self.shooting, &first.model)
+        let near = self.fitted_roughly(&short, &model)?;
+        self.fitted_over(&self.shooting, &near.model)
     }
 
     /// The declared model, fitted alone from the values of a first optimum, and what the logs determine of it there.
@@ -221,6 +232,27 @@ impl<'a> Problem<'a> {
         let own = first.model.effects[..self.declared.effects.len()].to_vec();
         let alone = self.fitted_over(&self.shooting, &first.model.with_effects(own))?;
         Ok((alone, self.identifiability_of(first)))
+    }
+
+    /// The declared model with these effects, fitted from the best of a few starts: these values and others around
+    /// them, compared on a few windows. A single start may end in a basin that another set of values would not.
+    fn best_beside(&self, start: &Model, effects: &[FittedEffect]) -> Result<Fitted, FitError> {
+        let settings = &self.settings.fit;
+        let short = self.windows_of(settings.short_window_s);
+        let short = Sample::of(&short, settings.sample_windows).shooting;
+        let own = &self.declared.effects;
+        let from = |start: &Model| {
+            let model = start.with_effects([own.as_slice(), effects].concat());
+            let near = self.fitted_roughly(&short, &model)?;
+            self.fitted_roughly(&self.sample.shooting, &near.model)
+        };
+        let others = spread(start, settings.first_starts, settings.farthest_start);
+        let starts: Vec<Model> = iter::once(start.clone()).chain(others).collect();
+        let found: Vec<Result<Fitted, FitError>> = starts.par_iter().map(from).collect();
+        let loss =
+            |found: &Result<Fitted, FitError>| found.as_ref().map_or(f64::INFINITY, Fitted::loss);
+        let best = found.into_iter().min_by(|a, b| loss(a).total_cmp(&loss(b)));
+        self.fitted_over(&self.shooting, &best.expect("the first start")?.model)
     }
 
     /// The declared model, fitted over short windows only, in which even a poor start does not diverge, from the
@@ -239,6 +271,19 @@ impl<'a> Problem<'a> {
         self.fitted_by(model, |dynamics, active| {
             let start_states = shooting.initial_start_states(0);
             fit_by(self.solver, shooting, dynamics, active, start_states, None)
+        })
+    }
+
+    fn evaluated_over(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fit, FitError> {
+        let dynamics = self.compiled(model);
+        let start_states = shooting.initial_start_states(0);
+        as_it_stands(shooting, &dynamics, &[], start_states, 1.0)
+    }
+
+    fn fitted_roughly(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fitted, FitError> {
+        self.fitted_by(model, |dynamics, active| {
+            let start_states = shooting.initial_start_states(0);
+            fit_roughly(self.solver, shooting, dynamics, active, start_states)
         })
     }
 

@@ -6,11 +6,12 @@ use rayon::prelude::*;
 use super::diagnostics::{Unexplained, diagnose};
 use super::error_model::ErrorModel;
 use super::establish::{Chosen, Standing};
-use super::every_log::EveryLog;
+use super::every_log::{EveryLog, SetApart};
 use super::fit::Declared;
 use super::fitted::Fitted;
 use super::gravity::{against_gravity, shares_of_gravity};
 use super::loss::Loss;
+use super::one_way::moves_one_way;
 use super::problem::Problem;
 use super::refine::Refined;
 use super::select::p_value;
@@ -46,11 +47,15 @@ pub(super) fn judge<'a>(
     if left.is_significant() {
         chosen.doubt(&problem, &before, &left);
     }
-    if problem.error_model == ErrorModel::InverseDynamics {
-        chosen.ask_every_log(problem.logs.iter().chain(apart));
-        if let Some((after, standing)) = problem.with_payload(&chosen.after) {
-            chosen.after = after;
-            chosen.standings.push(standing);
+    chosen.ask_both_directions(&problem);
+    match problem.error_model {
+        ErrorModel::OutputError => chosen.ask_logs_apart(&problem, apart),
+        ErrorModel::InverseDynamics => {
+            chosen.ask_every_log(problem.logs.iter().chain(apart));
+            if let Some((after, standing)) = problem.with_payload(&chosen.after) {
+                chosen.after = after;
+                chosen.standings.push(standing);
+            }
         }
     }
     let gravity = shares_of_gravity(&problem);
@@ -106,6 +111,33 @@ impl Chosen {
             let masks = masks(&standing.effect).then_some(MASKING);
             let reason = masks.or_else(|| is_outweighed(standing).then_some(OUTWEIGHED))?;
             Some(reason.into())
+        });
+    }
+
+    /// Effects of the velocity are not established if their joint moves in one direction only: there a constant force
+    /// would do as well.
+    fn ask_both_directions(&mut self, problem: &Problem<'_>) {
+        let joints = 0..problem.declared.joints;
+        let one_way: Vec<bool> = joints
+            .map(|joint| moves_one_way(problem.logs, joint))
+            .collect();
+        demote(&mut self.standings, |standing| {
+            let formula = standing.effect.effect.entry.formula();
+            let of_velocity = formula.is_some_and(|formula| formula.names().contains(&"qd"));
+            let joint = standing.effect.joint;
+            (of_velocity && one_way[joint.index()])
+                .then(|| format!("joint {joint} moves in one direction only"))
+        });
+    }
+
+    /// Effects are not established if they raise the open-loop error of a log set apart.
+    fn ask_logs_apart(&mut self, problem: &Problem<'_>, apart: &[Log]) {
+        let with = SetApart::of(problem, &self.after, apart);
+        demote(&mut self.standings, |standing| {
+            let without = standing.without.as_ref().ok()?;
+            let without = SetApart::of(problem, without, apart);
+            let log = with.worse_than(&without, &problem.settings.select)?;
+            Some(format!("it raises the error on {}", apart[log].name()))
         });
     }
 

@@ -24,6 +24,7 @@ mod judge;
 mod learn;
 mod loss;
 mod notes;
+mod one_way;
 mod outcome;
 mod payload;
 mod pipeline;

@@ -8,6 +8,7 @@ use super::fitted::Fitted;
 use super::problem::Problem;
 use crate::data::Log;
 use crate::identify::Values;
+use crate::model::Status;
 use crate::sim::metric::{errors_in, windows};
 
 /// Most groups of logs that are left out in turn.
@@ -33,26 +34,46 @@ pub(super) fn plainer(
     if problem.added(&after.model).is_empty() {
         return None;
     }
+    let settings = &problem.settings.select;
     let least = LeftOut::of(problem, after, apart);
     let usual = problem.with_usual_friction();
     let usual = usual.filter(|usual| !has_same_effects(usual, after));
     let all = "the effects that the search found are";
-    let others =
-        (usual.iter()).map(|usual| Other::new(usual, all, "of the model with the usual friction"));
-    let others = others.chain([Other::new(declared, all, "of the declared model")]);
+    let whole = |fitted, of| Other {
+        fitted,
+        unused: all.to_owned(),
+        of,
+        least: settings.plainer_gain,
+    };
+    let others = (usual.iter()).map(|usual| whole(usual, "of the model with the usual friction"));
+    let others = others.chain([whole(declared, "of the declared model")]);
     let without = chosen.standings.iter().filter_map(|standing| {
         let without = standing.without.as_ref().ok()?;
         // Most effects help on the logs set apart, which takes no refit to see.
-        let less = (!apart.is_empty()).then(|| log_error(&squares(problem, without, apart)));
-        let unused = format!("{} is", standing.effect.label());
-        (less <= least.apart).then(|| Other::new(without, unused, "without it"))
+        let less = error_apart(problem, without, apart);
+        let other = || Other {
+            fitted: without,
+            unused: format!("{} is", standing.effect.label()),
+            of: "without it",
+            // An effect that is not established has to help.
+            least: match standing.status {
+                Status::Established => settings.plainer_gain,
+                Status::Supported => 0.0,
+            },
+        };
+        (less <= least.apart).then(other)
     });
     let others: Vec<Other<'_>> = others.chain(without).collect();
     let gain = |other: &Other<'_>| {
         let left = LeftOut::of(problem, other.fitted, apart);
-        left.gain_over(&least, problem.settings.select.plainer_gain)
+        left.gain_over(&least, other.least)
     };
-    let gains: Vec<Option<f64>> = others.par_iter().map(gain).collect();
+    let mut gains: Vec<Option<f64>> = others.par_iter().map(gain).collect();
+    // A model that is worse than the declared one on the logs set apart is of no use, whatever the others say.
+    let of_declared = usual.iter().count();
+    let apart = LeftOut::apart(problem, declared, apart);
+    let gain = apart.gain_over(&least, settings.plainer_gain);
+    gains[of_declared] = gain.or(gains[of_declared]);
     let better = others.iter().zip(gains);
     let better = better.filter_map(|(other, gain)| Some((other, gain?)));
     let (best, gain) = better.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
@@ -72,13 +93,8 @@ struct Other<'a> {
     fitted: &'a Fitted,
     unused: String,
     of: &'static str,
-}
-
-impl<'a> Other<'a> {
-    fn new(fitted: &'a Fitted, unused: impl Into<String>, of: &'static str) -> Self {
-        let unused = unused.into();
-        Self { fitted, unused, of }
-    }
+    /// The share by which its error has to be lower.
+    least: f64,
 }
 
 fn has_same_effects(a: &Fitted, b: &Fitted) -> bool {
@@ -97,11 +113,19 @@ impl LeftOut {
     fn of(problem: &Problem<'_>, fitted: &Fitted, apart: &[Log]) -> Self {
         let (in_turn, apart) = rayon::join(
             || left_in_turn(problem, fitted),
-            || Some(squares(problem, fitted, apart)).filter(|_| !apart.is_empty()),
+            || error_apart(problem, fitted, apart),
         );
         Self {
             in_turn: in_turn.map(|squares| log_error(&squares)),
-            apart: apart.map(|squares| log_error(&squares)),
+            apart,
+        }
+    }
+
+    /// On the logs set apart only.
+    fn apart(problem: &Problem<'_>, fitted: &Fitted, apart: &[Log]) -> Self {
+        Self {
+            in_turn: None,
+            apart: error_apart(problem, fitted, apart),
         }
     }
 
@@ -117,6 +141,10 @@ impl LeftOut {
         let sum: f64 = known.iter().sum();
         (sum > 0.0 && known.iter().any(|gain| *gain > least)).then_some(sum / known.len() as f64)
     }
+}
+
+fn error_apart(problem: &Problem<'_>, fitted: &Fitted, apart: &[Log]) -> Option<f64> {
+    (!apart.is_empty()).then(|| log_error(&squares(problem, fitted, apart)))
 }
 
 /// The logarithm of the root of each sum of squares, on average.

@@ -139,6 +139,9 @@ settings! {
         /// A joint is at rest in a window if it moves less than this share of its farthest travel in any window (as
         /// squares): errors relative to no travel are meaningless.
         at_rest_share: f64 = 1e-2,
+        /// The first optimum is looked for from the values in the file and from this many others around them, up to
+        /// `farthest_start`, on a few windows.
+        first_starts: u32 = 4,
         /// If a model diverges with the starting values in its file, up to this many others are tried before it is
         /// reported that none works.
         most_starts: u32 = 512,
@@ -442,6 +445,9 @@ settings! {
         /// Effects may raise the error on the test logs by this factor and still be trusted: noise in the windows'
         /// start states raises it by less.
         trusted_rise: f64 = 1.05,
+        /// Effects explain the logs only if the open-loop error on the test logs is at most this many times what the
+        /// noise of the sensors accounts for, which is estimated with caution.
+        noise_floors: f64 = 3.0,
     }
 
     /// Stage 10 determines what the logs can show.

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::diagnostics::ResidualForce;
 use super::establish::{Chosen, Standing, establish};
+use super::every_log::SetApart;
 use super::fit::{Declared, NOTHING};
 use super::fitted::Fitted;
 use super::judge::Found;
@@ -169,6 +170,41 @@ fn an_effect_that_saves_little_is_not_established() {
     assert!(reason.contains("the loss on left-out blocks by"));
 }
 
+/// Far from the declared values, where a fit may not move at all.
+#[test]
+fn the_first_optimum_does_not_depend_on_the_start() {
+    let loss = |factor: f64| {
+        let mut study = Study::of_friction();
+        for parameter in &mut study.declared.parameters {
+            parameter.value *= factor;
+        }
+        let problem = study.problem().with_first_optimum();
+        problem.first.unwrap().loss()
+    };
+    let known = loss(1.0);
+    for factor in [0.2, 0.5, 2.0, 5.0] {
+        let found = loss(factor);
+        assert!(
+            (found / known - 1.0).abs() < 0.01,
+            "{factor}: {found}, not {known}"
+        );
+    }
+}
+
+#[test]
+fn a_log_set_apart_tells_which_model_is_worse() {
+    let (study, test) = Study::of_friction().split();
+    let problem = study.problem();
+    let without = problem.fit_declared().unwrap().fitted;
+    let effects = vec![absent("coulomb_friction")];
+    let with = problem.with_effects(&without, effects).unwrap();
+    let [with, without] = [with, without].map(|fitted| SetApart::of(&problem, &fitted, &test));
+    let settings = &study.settings.select;
+    assert_eq!(with.worse_than(&without, settings), None);
+    assert_eq!(without.worse_than(&with, settings), Some(0));
+    assert_eq!(with.worse_than(&with, settings), None);
+}
+
 #[test]
 fn a_fit_that_fails_allows_no_verdict() {
     let (study, test) = Study::of_friction().split();
@@ -178,7 +214,7 @@ fn a_fit_that_fails_allows_no_verdict() {
     let finer = refined(&found.problem, &found.before, &found.chosen.after);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let models = Scored {
-        error_model: problem.error_model,
+        problem: &problem,
         declared: &study.declared,
         before: &finer.before,
         with_friction: None,
@@ -186,7 +222,15 @@ fn a_fit_that_fails_allows_no_verdict() {
         hybrid: None,
         against: &[],
     };
-    let errors = scorer.errors(models, &mut rng);
+    let mut errors = scorer.errors(models, &mut rng);
+    // The structure is the true one: noise is all that is left.
+    let over_noise = errors.over_noise().unwrap();
+    assert!((0.3..2.0).contains(&over_noise), "{over_noise}");
+    errors.noise_floor = Some(0.1 * errors.after.position_rms());
+    let (answer, reason) = verdict(&found, &finer, &errors);
+    assert_eq!(answer, Verdict::PartlyExplained);
+    assert!(reason.contains("is 10 times what the noise of the sensors accounts for"));
+    errors.noise_floor = None;
     let of = |found: &Found<'_>, refined: &_| verdict(found, refined, &errors);
     assert_eq!(of(&found, &finer).0, Verdict::Explained);
 

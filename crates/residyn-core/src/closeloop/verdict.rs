@@ -63,7 +63,27 @@ fn concluded(found: &Found<'_>, refined: &Refined<'_>, errors: &Errors) -> (Verd
             let (verdict, reason) = conclusion(established, &found.unexplained);
             (verdict, format!("{reason}; {STOPPED}"))
         }
-        None => conclusion(established, &found.unexplained),
+        None => above_noise(conclusion(established, &found.unexplained), problem, errors),
+    }
+}
+
+/// A conclusion that nothing is left, if the error on the test logs is what the sensors' noise leaves; else that something
+/// is, though no test of the residuals says what.
+fn above_noise(
+    (verdict, reason): (Verdict, String),
+    problem: &Problem<'_>,
+    errors: &Errors,
+) -> (Verdict, String) {
+    let most = problem.settings.verdict.noise_floors;
+    let over = errors.over_noise().filter(|over| *over > most);
+    match over.filter(|_| verdict == Verdict::Explained) {
+        Some(over) => (
+            Verdict::PartlyExplained,
+            format!(
+                "{reason}, but the error on the test logs is {over:.0} times what the noise of the sensors accounts for"
+            ),
+        ),
+        None => (verdict, reason),
     }
 }
 

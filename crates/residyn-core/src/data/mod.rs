@@ -11,6 +11,7 @@ mod audit;
 mod channels;
 mod column;
 mod columns;
+mod direction;
 mod dropped;
 mod error;
 mod examined;

@@ -1,5 +1,6 @@
 //! The motion of a log as the torque error uses it: resampled at even steps, low-pass filtered, differentiated.
 
+use super::direction::directions;
 use super::instant::{ROUNDING, SAME_S};
 use super::log::Log;
 use super::low_pass::LowPass;
@@ -144,9 +145,8 @@ impl Smooth {
         // Angles a step.
         let speeds: Vec<Vec<f64>> = q.iter().map(|q| central_differences(q)).collect();
         let direction = |(speeds, width): (&Vec<f64>, &f64)| {
-            let width = width.max(f64::MIN_POSITIVE);
-            let signs = speeds.iter().map(|speed| (speed / step_s / width).tanh());
-            smoothing.used_of(&filter.apply(&signs.collect::<Vec<f64>>()))
+            let width = width.max(f64::MIN_POSITIVE) * step_s;
+            smoothing.used_of(&filter.apply(&directions(speeds, width, log.torque)))
         };
         let of_joints = read.iter().zip(&q).zip(&speeds);
         let at_rest = of_joints.map(|((read, q), speeds)| rests(read, q, speeds, *cutoff));

@@ -1,4 +1,4 @@
-use crate::data::{LocalCubic, Log, local_cubic, rows_around};
+use crate::data::{LocalCubic, Log, half_width_s, local_cubic, rows_around};
 
 /// A log's estimate of the state at one of its rows: angles, then velocities.
 pub(super) struct Start {
@@ -46,6 +46,14 @@ impl Start {
         let (state, weight) = both(0).chain(both(1)).unzip();
         Self { state, weight }
     }
+}
+
+/// Standard deviation of each value of the state that a prediction starts from at a row: positions, then velocities.
+/// `noise` is that of each joint's position. `None` if the rows do not determine it.
+pub fn start_deviations(log: &Log, row: usize, noise: &[f64]) -> Option<Vec<f64>> {
+    let start = Start::of(log, row, half_width_s(log.median_step()), noise);
+    let deviation = |weight: &f64| (*weight > 0.0).then(|| 1.0 / weight);
+    start.weight.iter().map(deviation).collect()
 }
 
 #[cfg(test)]

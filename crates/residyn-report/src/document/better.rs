@@ -205,6 +205,7 @@ fn of_motion(report: &Report) -> Vec<Block> {
     let horizon = format!("error at {} s", error.middle().1);
     let remarks = [
         bootstrapped(error.reduction_ci95, &horizon),
+        of_noise(report),
         uneven(report),
         zeroing_that_harms(error),
     ];
@@ -218,6 +219,17 @@ fn of_motion(report: &Report) -> Vec<Block> {
     let remarks = paragraphs(remarks.chain(diverged).chain(unscored));
     let title = heading("Open-loop motion");
     [vec![title, paragraph(about_motion(report)), table], remarks].concat()
+}
+
+/// What the noise of the sensors alone would leave.
+fn of_noise(report: &Report) -> Option<String> {
+    let (error, unit) = (&report.error, position_unit(report));
+    let floor = small(error.noise_floor?);
+    let horizon = error.middle().1;
+    Some(format!(
+        "The noise of the position sensors, in the rows and in the states from which predictions start, accounts for \
+         {floor} {unit} at {horizon} s, all joints together."
+    ))
 }
 
 fn about_motion(report: &Report) -> String {

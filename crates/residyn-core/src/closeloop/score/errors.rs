@@ -3,9 +3,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::bootstrap::{interval, reduction_interval};
+use super::noise_floor::noise_floor;
 use super::test_log::TestLog;
 use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::request::Reference;
 use crate::closeloop::settings::ScoreSettings;
 use crate::data::Log;
@@ -27,6 +29,9 @@ pub struct Errors {
     /// The same with each test log's sensor zeros estimated on its beginning, scored on the rest; if the model has
     /// zeros per log, and the logs are long enough.
     pub zeroed: Option<Assessment>,
+    /// The position error of all joints together at the middle horizon that the sensors' noise accounts for; see
+    /// [`noise_floor`].
+    pub noise_floor: Option<f64>,
     /// With the residual network.
     pub hybrid: Option<Assessment>,
     /// Other models as they are, by name.
@@ -55,6 +60,11 @@ pub struct TorqueErrors {
 }
 
 impl Errors {
+    /// How many times what the sensors' noise accounts for the error of the model with effects is.
+    pub fn over_noise(&self) -> Option<f64> {
+        Some(self.after.position_rms() / self.noise_floor?)
+    }
+
     /// The errors of the fitted declared model and of the one with effects, in one number each.
     pub fn compared(&self, error_model: ErrorModel) -> [f64; 2] {
         match (error_model, &self.torque) {
@@ -69,8 +79,8 @@ impl Errors {
 /// The models that are compared.
 #[derive(Clone, Copy)]
 pub(in crate::closeloop) struct Scored<'m> {
-    /// The errors by which they are compared.
-    pub error_model: ErrorModel,
+    /// That they were fitted to.
+    pub problem: &'m Problem<'m>,
     /// With the values in its file.
     pub declared: &'m Model,
     pub before: &'m Fitted,
@@ -101,7 +111,13 @@ impl Scorer<'_> {
             against: models.against.iter().map(scored).collect(),
             reduction_ci95: reduction_interval(before.middle(), after.middle(), self.settings, rng),
             zeroed: self.zeroed(models.after),
-            by_log: self.log_by_log(models.error_model, fitted, [&before, &after]),
+            noise_floor: noise_floor(
+                models.problem,
+                &models.after.model.dynamics(),
+                self.test,
+                self.settings.middle_s(),
+            ),
+            by_log: self.log_by_log(models.problem.error_model, fitted, [&before, &after]),
             torque,
             before,
             after,

@@ -4,6 +4,7 @@ mod bootstrap;
 mod contradicted;
 mod contribution;
 mod errors;
+mod noise_floor;
 mod predictions;
 mod test_log;
 
@@ -59,7 +60,7 @@ pub fn score(
     };
     let without_network = refined.after.model.absorbed().dynamics();
     let models = Scored {
-        error_model: problem.error_model,
+        problem: &problem,
         declared: &prepared.model,
         before: &refined.before,
         with_friction: with_friction.filter(|model| !problem.added(&model.model).is_empty()),

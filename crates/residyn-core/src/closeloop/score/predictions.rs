@@ -53,7 +53,7 @@ impl Scorer<'_> {
             Needed { before, after }
         };
         let logs = self.test.par_iter();
-        let (longest, torques) = match models.error_model {
+        let (longest, torques) = match models.problem.error_model {
             ErrorModel::OutputError => (logs.map(of_motion).collect(), Vec::new()),
             ErrorModel::InverseDynamics => (Vec::new(), logs.map(of_torques).collect()),
         };

@@ -10,6 +10,9 @@ pub struct Folds {
     pub blocks: Vec<usize>,
     /// The group of each block: its log or, if there are few logs, a part of it.
     pub groups: Vec<usize>,
+    /// The log of each block, and the number of logs.
+    log_of: Vec<usize>,
+    logs: usize,
     /// The share of the information on each value that is taken to be known without its group.
     kept_information: f64,
 }
@@ -33,6 +36,8 @@ impl Folds {
         let groups = log_of.iter().enumerate().map(group).collect();
         Self {
             blocks,
+            log_of,
+            logs,
             groups,
             kept_information: problem.settings.select.kept_information,
         }
@@ -44,10 +49,13 @@ impl Folds {
         self
     }
 
-    /// These blocks in two groups, odd and even.
+    /// These blocks in two groups: every other log, or the odd and the even blocks of a single log.
     pub fn in_halves(mut self) -> Self {
-        let blocks = self.groups.len();
-        self.groups = (0..blocks).map(|block| block % 2).collect();
+        let half = |(block, log): (usize, &usize)| match self.logs {
+            1 => block % 2,
+            _ => log % 2,
+        };
+        self.groups = self.log_of.iter().enumerate().map(half).collect();
         self
     }
 

@@ -25,6 +25,7 @@ pub(super) use self::candidate::{acting, best_start, is_of_too_many, screened_co
 pub(super) use self::evidence::{gain, p_of_gains, p_value};
 pub(super) use self::folds::{Folds, left_out_losses};
 pub(super) use self::losses::Losses;
+pub(super) use self::open_loop_check::is_worse;
 pub use self::rivals::Rival;
 pub(super) use self::rivals::rivals;
 pub use self::screen::screen;

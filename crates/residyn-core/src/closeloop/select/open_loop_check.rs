@@ -29,11 +29,16 @@ impl OpenLoopCheck {
 
     /// Whether this error exceeds another by more than chance and rounding.
     pub fn is_worse_than(&self, other: &Self, settings: &SelectSettings) -> bool {
-        let rises = differences(&self.squares, &other.squares);
-        let rise = rises.iter().sum::<f64>() / other.squares.iter().sum::<f64>();
-        mean(&rises) > settings.worse_standard_errors * standard_error(&rises)
-            && rise > settings.worse_share
+        is_worse(&self.squares, &other.squares, settings)
     }
+}
+
+/// Whether sums of squares of errors exceed others by more than chance and rounding.
+pub fn is_worse(squares: &[f64], others: &[f64], settings: &SelectSettings) -> bool {
+    let rises = differences(squares, others);
+    let rise = rises.iter().sum::<f64>() / others.iter().sum::<f64>();
+    mean(&rises) > settings.worse_standard_errors * standard_error(&rises)
+        && rise > settings.worse_share
 }
 
 /// Squares of the open-loop error in each block, with the values that a fit without the block's group gives.

@@ -28,6 +28,19 @@ fn what_is_left_out_together_is_a_connected_part_of_one_log() {
 }
 
 #[test]
+fn halves_are_whole_logs() {
+    let study = Study::of_friction();
+    let problem = study.problem();
+    let halves = Folds::of(&problem).in_halves();
+    for (block, window) in halves.blocks.iter().zip(&problem.shooting.windows) {
+        assert_eq!(halves.groups[*block], window.log % 2);
+    }
+    let single = problem.on(&study.logs[..1]);
+    let halves = Folds::of(&single).in_halves();
+    assert_eq!(halves.groups[..4], [0, 1, 0, 1]);
+}
+
+#[test]
 fn a_loss_far_below_zero_is_rounding_and_no_loss() {
     let one = |value: f64| DVector::from_element(1, value);
     let curved = DMatrix::from_element(1, 1, 2.0);

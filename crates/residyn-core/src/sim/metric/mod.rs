@@ -3,6 +3,7 @@
 
 mod assessment;
 mod open_loop;
+mod start_noise;
 mod summary;
 mod torque;
 mod trace;
@@ -10,6 +11,7 @@ mod trace;
 pub use assessment::{Assessment, OpenLoop, WindowError};
 pub use open_loop::{assess, window_count};
 pub use open_loop::{errors_in, windows};
+pub use start_noise::error_of_starts;
 pub use summary::{Summary, summarise};
 pub use torque::{
     NeededTorques, TorqueError, needed_torques, torque_column, torque_error, torques_leave,
