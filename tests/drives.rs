@@ -86,7 +86,7 @@ fn a_position_actuator_without_a_force_range_has_no_limit() {
     );
     says(
         &said,
-        &["`shoulder` declares no force range: the drive of `shoulder` has no limit"],
+        &["`shoulder` has no force range: its force is not limited"],
     );
     let model = scratch.read("arm.toml");
     assert!(!model.contains("limit_1"), "{model}");
