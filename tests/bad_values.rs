@@ -160,11 +160,18 @@ fn files_with_too_much_of_anything_are_refused() {
     let defaults = "<geom size='1'/>".repeat(201);
     let defaults = format!("<mujoco><default>{defaults}</default></mujoco>");
     scratch.file("defaults.xml", defaults);
+    // A schema of one column whose group claims 2^31 - 1 of them.
+    let schema = b"\x15\x02\x19\x2c\x48\x01r\x15\xfe\xff\xff\xff\x0f\x00\x15\x0a\x38\x01q\x00";
+    let footer = [&schema[..], b"\x16\x00\x19\x0c\x00"].concat();
+    let length = u32::try_from(footer.len()).unwrap().to_le_bytes();
+    let claims = [b"PAR1", &footer[..], &length, b"PAR1"].concat();
+    scratch.file("claims.parquet", claims);
     for [line, words] in rows(
         "check many.toml             | line  ... entries; at most 1000 are read
          check lets.toml             | line  ... entries; at most 1000 are read
          check long.toml             | long.toml ... more than 4 MB
          audit wide.csv              | wide.csv ... 100000 columns; at most 4096
+         audit claims.parquet        | claims.parquet ... claims 2147483647 columns and groups, and describes 2
          audit unknown.csv           | column39 and 3960 more
          new --from-mjcf deep.xml    | deep.xml, line 1 ... more than 200 elements
          new --from-mjcf defaults.xml | defaults.xml, line 1 ... more than 200 elements",

@@ -70,6 +70,61 @@ fn a_log_of_commands_needs_a_drive() {
     }
 }
 
+/// What a command says on standard error.
+fn notes(scratch: &Scratch, line: &str) -> String {
+    String::from_utf8(scratch.run(line).stderr).unwrap()
+}
+
+#[test]
+fn a_position_actuator_without_a_force_range_has_no_limit() {
+    let scratch = Scratch::new();
+    let drawn = arm("", "").replace(" forcerange=\"-12 12\"", "");
+    scratch.file("arm.xml", drawn);
+    let said = notes(
+        &scratch,
+        "new --from-mjcf arm.xml --tip fore --out arm.toml",
+    );
+    says(
+        &said,
+        &["`shoulder` has no force range: its force is not limited"],
+    );
+    let model = scratch.read("arm.toml");
+    assert!(!model.contains("limit_1"), "{model}");
+    assert!(model.contains("tau1 = \"kp_1 * (cmd1 - q1) - kd_1 * qd1\""));
+    assert!(model.contains("limit_2 = { value = 5.0"), "{model}");
+    scratch.succeeds("check arm.toml");
+}
+
+#[test]
+fn the_example_of_a_limit_is_said_to_be_one() {
+    let scratch = Scratch::new();
+    let drawn = arm("", "")
+        .replace("<position", "<motor")
+        .replace("kp=", "kv=");
+    scratch.file("arm.xml", drawn.replace(" forcerange=\"-12 12\"", ""));
+    let line = "new --from-mjcf arm.xml --tip fore --drive position_servo --out arm.toml";
+    let wanted = "no effort limit of shoulder: `limit` of the drive is an example";
+    says(&notes(&scratch, line), &[wanted]);
+}
+
+#[test]
+fn joints_of_a_description_are_made_bare() {
+    let scratch = Scratch::new();
+    scratch.file("arm.xml", arm("armature=\"0.02\"", "frictionloss=\"0.15\""));
+    let line = "new --from-mjcf arm.xml --tip fore --bare-joints --out arm.toml";
+    let wanted = "left out of joint shoulder: damping 0.3, rotor inertia 0.02";
+    says(
+        &notes(&scratch, line),
+        &[wanted, "left out of joint elbow: dry friction 0.15"],
+    );
+    let bare = scratch.read("arm.toml");
+    scratch.file("arm.xml", arm("", "").replace("damping=\"0.3\"", ""));
+    scratch.succeeds("new --from-mjcf arm.xml --tip fore --out plain.toml");
+    let kept = |line: &&str| !line.starts_with("# left out");
+    let bare: Vec<&str> = bare.lines().filter(kept).collect();
+    assert_eq!(bare, scratch.read("plain.toml").lines().collect::<Vec<_>>());
+}
+
 /// The error message for a model file with this drive.
 fn message(drive: &str) -> String {
     let library = Library::built_in();

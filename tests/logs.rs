@@ -183,6 +183,73 @@ fn a_clock_in_nanoseconds_is_refused_at_once_with_its_line() {
     says(&desk.refuses(CLOSELOOP), &[line]);
 }
 
+/// A joint whose columns go by their numbers, in a text table and in a matrix of NumPy.
+#[test]
+fn a_log_without_a_header_is_read_by_the_numbers_of_its_columns() {
+    let desk = desk(|_| {});
+    let csv = desk.read("run.csv");
+    let rows: Vec<&str> = csv.lines().skip(1).collect();
+    let plain = desk.file("plain.txt", rows.join("\n").replace(',', "  "));
+    let numbers = rows.iter().flat_map(|row| row.split(','));
+    let numbers = numbers.flat_map(|cell| cell.parse::<f64>().unwrap().to_le_bytes());
+    let head = format!(
+        "{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 4), }}",
+        rows.len()
+    );
+    let length = u16::try_from(head.len()).unwrap().to_le_bytes();
+    let parts: [&[u8]; 4] = [
+        b"\x93NUMPY\x01\x00",
+        &length,
+        head.as_bytes(),
+        &numbers.collect::<Vec<u8>>(),
+    ];
+    let matrix = desk.file("matrix.npy", parts.concat());
+    write_model(
+        &desk,
+        &["time = 1".into(), "q = [2]\nqd = [3]\ntau = [4]".into()],
+    );
+    let columns = read_model(desk.path("model.toml"), &Library::built_in())
+        .unwrap()
+        .columns;
+    let wanted = read_rig_log(desk.path("run.csv"), 1, &Columns::default()).unwrap();
+    for name in [plain, matrix] {
+        let read = read_rig_log(desk.path(&name), 1, &columns).unwrap();
+        assert!(
+            read.q == wanted.q && read.qd == wanted.qd && read.tau == wanted.tau,
+            "{name}"
+        );
+    }
+    let said = desk.refuses("audit --model pendulum plain.txt");
+    says(
+        &said,
+        &[
+            "plain.txt, line 1",
+            "time = 1, q = [2], qd = [3], tau = [4]",
+        ],
+    );
+    // A joint without a drive has no column.
+    write_model(&desk, &[r#"tau = [""]"#.into()]);
+    let model = read_model(desk.path("model.toml"), &Library::built_in()).unwrap();
+    let passive = read_rig_log(desk.path("run.csv"), 1, &model.columns).unwrap();
+    assert!(passive.tau[0].iter().all(|torque| *torque == 0.0));
+    let note = "joint 1 has no column of `tau`: read as a joint without a drive";
+    assert!(
+        passive.notes.iter().any(|said| said == note),
+        "{:?}",
+        passive.notes
+    );
+    write_model(&desk, &[r#"q = [""]"#.into()]);
+    says(
+        &desk.refuses("check model.toml"),
+        &["only a joint without a drive"],
+    );
+    write_model(&desk, &["q = [0]".into()]);
+    says(
+        &desk.refuses("check model.toml"),
+        &["columns are counted from 1"],
+    );
+}
+
 #[test]
 fn velocities_come_from_the_angles_where_a_log_has_none() {
     let desk = desk(|_| {});

@@ -5,7 +5,7 @@ use clap::{Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, value_parse
 use serde_json::json;
 
 use super::{Answer, Common, terminal};
-use residyn_formats::{FORMATS, Format, RobotReader};
+use residyn_formats::{FORMATS, Format, RobotReader, model_of};
 use residyn_io::files::write_whole;
 
 /// Write a model file for a serial mechanism, its equations derived from a robot description
@@ -21,6 +21,10 @@ pub(super) struct Arguments {
     /// What drives the joints, if their logs hold commands instead of torques: one of `residyn list drives`
     #[arg(long, value_name = "NAME")]
     drive: Option<String>,
+    /// Leave out the damping, dry friction and rotor inertia that the file gives the joints. They are often chosen for a
+    /// simulator; without them, `closeloop` names those that the logs show
+    #[arg(long)]
+    bare_joints: bool,
     /// The model file to write; standard output if not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -82,9 +86,13 @@ impl FromArgMatches for Description {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let Description { reader, file } = &arguments.description;
     let (tip, drive) = (arguments.tip.as_deref(), arguments.drive.as_deref());
-    let (model, notes) = reader.model(file, tip, drive)?;
+    let mut chain = reader.chain(file, tip, drive)?;
+    if arguments.bare_joints {
+        chain = chain.with_bare_joints();
+    }
+    let (model, notes) = (model_of(&chain)?, &chain.notes);
     let text = &model.text;
-    for note in &notes {
+    for note in notes {
         terminal::say(format!("note: {note}"));
     }
     if let Some(out) = &arguments.out {

@@ -70,16 +70,35 @@ impl RobotReader {
         tip: Option<&str>,
         drive: Option<&str>,
     ) -> Result<(Model, Vec<String>), FileError> {
-        let mut chain = (self.read)(file, tip)?;
-        if let Some(name) = drive {
-            let found = ReadyDrive::find(Library::drives(), name);
-            let found = found.map_err(|unknown| FileError::new(file, None, unknown.to_string()));
-            chain.drive = Some(found?);
-        }
-        let name = Path::new(&chain.name);
-        let model = Model::from_text(name, &model_text(&chain), Library::built_in().effects())?;
-        Ok((model, chain.notes))
+        let chain = self.chain(file, tip, drive)?;
+        Ok((model_of(&chain)?, chain.notes))
     }
+
+    /// As [`RobotReader::model`], the chain.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn chain(
+        &self,
+        file: &Path,
+        tip: Option<&str>,
+        drive: Option<&str>,
+    ) -> Result<Chain, FileError> {
+        let chain = (self.read)(file, tip)?;
+        let Some(name) = drive else { return Ok(chain) };
+        let found = ReadyDrive::find(Library::drives(), name);
+        let found = found.map_err(|unknown| FileError::new(file, None, unknown.to_string()));
+        Ok(chain.driven_by(found?))
+    }
+}
+
+/// The model of a chain.
+///
+/// # Errors
+/// A chain whose values no model can have.
+pub fn model_of(chain: &Chain) -> Result<Model, FileError> {
+    let name = Path::new(&chain.name);
+    Model::from_text(name, &model_text(chain), Library::built_in().effects())
 }
 
 /// A file to be written.

@@ -272,6 +272,38 @@ mod tests {
     }
 
     #[test]
+    fn a_file_without_a_header_is_read_by_the_numbers_of_its_columns() {
+        let columns = Columns {
+            time: "1".into(),
+            q: vec!["3".into()],
+            qd: None,
+            tau: vec!["2".into()],
+            ..Columns::default()
+        };
+        for text in [
+            "0,5,1\n1,6,2\n",
+            "  0  5 1\n  1  6 2 \n",
+            "0\t5\t1\n1\t6\t2\n",
+        ] {
+            let log = read_as(text, 1, &columns).unwrap();
+            assert_eq!((&log.time, &log.q[0]), (&vec![0.0, 1.0], &vec![1.0, 2.0]));
+            assert_eq!(log.tau[0], [5.0, 6.0]);
+        }
+        let wrong = read_as("0,5,1\n1,x,2\n", 1, &columns).unwrap_err();
+        assert!(
+            wrong.to_string().contains("line 2, column \"2\": \"x\""),
+            "{wrong}"
+        );
+        // What is missing in the first row is said, not taken for a name.
+        let empty = read_as("0,5,\n1,6,2\n", 1, &columns).unwrap_err();
+        assert!(
+            empty.to_string().contains("line 1, column \"3\""),
+            "{empty}"
+        );
+        assert!(message("0,5,1\n1,6,2\n").contains("time = 1, q = [2]"));
+    }
+
+    #[test]
     fn time_has_to_increase() {
         let error = message("time,q1,qd1,tau1\n0.5,0,0,0\n0.5,0,0,0\n");
         assert!(

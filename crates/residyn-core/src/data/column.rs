@@ -83,7 +83,7 @@ impl Quantity {
 /// for a joint that slides).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
-    /// As the header has it.
+    /// As the header has it; its number, from 1, in a file without a header. Empty for a joint without a drive.
     pub name: String,
     /// The unit of the file's numbers, one of [`Quantity::units`]; `None` for the channel's own unit.
     pub unit: Option<&'static str>,
@@ -106,6 +106,11 @@ impl Column {
             wrapped: false,
             late_s: 0.0,
         }
+    }
+
+    /// Whether it stands for no column: its joint has no drive.
+    pub fn is_none(&self) -> bool {
+        self.name.is_empty()
     }
 
     /// What a number in the file is multiplied by.

@@ -199,8 +199,8 @@ pub(super) struct Layout {
     pub q: Vec<Cell>,
     /// `None` if velocities come from the angles.
     pub qd: Option<Vec<Cell>>,
-    /// `None` for the log of a passive rig, which has no torque columns.
-    pub tau: Option<Vec<Cell>>,
+    /// `None` for the log of a passive rig, which has no torque columns, and for a joint without a drive.
+    pub tau: Option<Vec<Option<Cell>>>,
     /// Names of the columns that nothing reads.
     pub ignored: Vec<String>,
 }
@@ -208,8 +208,8 @@ pub(super) struct Layout {
 impl Layout {
     /// The channels: angles, velocities, torques.
     fn channels(&self) -> impl Iterator<Item = &Cell> {
-        let driven = self.qd.iter().chain(&self.tau).flatten();
-        self.q.iter().chain(driven)
+        let tau = self.tau.iter().flatten().flatten();
+        self.q.iter().chain(self.qd.iter().flatten()).chain(tau)
     }
 
     /// Time and all channels.
@@ -226,8 +226,8 @@ impl Layout {
 impl Header<'_> {
     /// Finds the columns of a model with `joints` joints.
     pub fn layout(&self, joints: usize, columns: &Columns) -> Result<Layout, LogError> {
-        self.check_is_a_header()?;
         let columns = columns.completed(joints, self.path)?;
+        self.check_is_a_header(&columns)?;
         let standard = Columns {
             topic: columns.topic.clone(),
             joint_names: columns.joint_names.clone(),
@@ -244,23 +244,37 @@ impl Header<'_> {
             let find = |column: &Column| self.find(column, quantity, &columns);
             list.iter().map(find).collect::<Result<Vec<_>, _>>()
         };
+        let driven = |list: &[Column]| {
+            let driven = list.iter().map(|column| {
+                let named = Some(column).filter(|column| !column.is_none());
+                named.map(|column| self.find(column, columns.driven_by, &columns))
+            });
+            driven.map(Option::transpose).collect::<Result<Vec<_>, _>>()
+        };
         let qd = columns.qd.as_deref().filter(|_| !still);
         let tau = Some(&columns.tau).filter(|_| !passive);
         Ok(Layout {
             time: self.find(&columns.time, Quantity::Time, &columns)?,
             q: all(&columns.q, Quantity::Angle)?,
             qd: qd.map(|qd| all(qd, Quantity::Velocity)).transpose()?,
-            tau: tau.map(|tau| all(tau, columns.driven_by)).transpose()?,
+            tau: tau.map(|tau| driven(tau)).transpose()?,
             ignored: self.others(&columns),
         })
     }
 
-    fn check_is_a_header(&self) -> Result<(), LogError> {
+    /// Numbers for names, unless the columns are numbers as well.
+    fn check_is_a_header(&self, columns: &Columns) -> Result<(), LogError> {
         let (path, place) = (self.path.to_owned(), self.place);
-        if self.names.iter().all(|name| name.parse::<f64>().is_ok()) {
+        let is_numbered = |column: &Column| column.is_none() || is_whole(&column.name);
+        if self.has_numbers() && !columns.in_file_order().all(is_numbered) {
             return Err(LogError::NoHeader { path, place });
         }
         Ok(())
+    }
+
+    /// Whether all names are numbers: those of the columns of a table without a header.
+    fn has_numbers(&self) -> bool {
+        self.names.iter().all(|name| name.parse::<f64>().is_ok())
     }
 
     /// A header with another number of complete joints most likely belongs to the log of another rig. If only one of a
@@ -328,6 +342,20 @@ impl Header<'_> {
     /// Points to the nearest of the `free` names (those of no other channel) if one is near, and to all names
     /// otherwise.
     fn remedy(&self, wanted: &str, quantity: Quantity, free: &[String]) -> String {
+        if self.has_numbers() {
+            let columns = self.names.len();
+            return format!(
+                "the file has no header, and {columns} columns: under [columns] in the model file, give a number from 1 \
+                 to {columns}"
+            );
+        }
+        if is_whole(wanted) {
+            let names = listed(self.names.iter().map(String::as_str));
+            return format!(
+                "columns go by their numbers only in a file without a header; name one of {names} under [columns] in the \
+                 model file"
+            );
+        }
         let joints = joints(&self.names);
         if !joints.is_empty() && quantity == Quantity::Angle {
             return format!(
@@ -353,7 +381,11 @@ impl Header<'_> {
                         instance tau1 = \"kp*(cmd1 - q1) - kd*qd1\"; `residyn list drives` shows ready-made drives"
                     .to_owned();
             }
-            list => format!("{} = [{example:?}]", list.key()),
+            Quantity::Torque | Quantity::Command => {
+                let key = quantity.key();
+                format!("{key} = [{example:?}], with \"\" for a joint without a drive")
+            }
+            Quantity::Angle => format!("q = [{example:?}]"),
         };
         let known = match nearest {
             Some(name) => format!("did you mean {name:?}?"),
@@ -370,6 +402,10 @@ impl Header<'_> {
         let unused = self.names.iter().filter(|name| !used(name));
         unused.cloned().collect()
     }
+}
+
+fn is_whole(name: &str) -> bool {
+    name.parse::<usize>().is_ok()
 }
 
 fn is_command(name: &str) -> bool {
@@ -414,12 +450,13 @@ mod tests {
     /// The places of the channels, each with the standard unit.
     fn places(header: &str, joints: usize, columns: &Columns) -> [Option<Vec<usize>>; 3] {
         let found = layout(header, joints, columns).unwrap();
+        let tau = found.tau.map(|tau| tau.into_iter().flatten().collect());
         let places = |cells: Vec<Cell>| {
             let as_is = cells.iter().all(|found| *found == cell(found.index));
             assert!(as_is, "{cells:?}");
             cells.iter().map(|cell| cell.index).collect()
         };
-        [Some(found.q), found.qd, found.tau].map(|cells| cells.map(places))
+        [Some(found.q), found.qd, tau].map(|cells| cells.map(places))
     }
 
     #[test]
@@ -429,7 +466,7 @@ mod tests {
             time: cell(4),
             q: vec![cell(3)],
             qd: Some(vec![cell(2)]),
-            tau: Some(vec![cell(0)]),
+            tau: Some(vec![Some(cell(0))]),
             ignored: vec!["note".to_owned()],
         };
         assert_eq!(found, expected);
@@ -482,6 +519,40 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(error.contains("names 2 column(s) for `tau`"), "{error}");
+    }
+
+    #[test]
+    fn columns_without_a_header_go_by_their_numbers() {
+        let columns = Columns {
+            time: "1".into(),
+            q: vec!["3".into()],
+            qd: None,
+            tau: vec!["2".into()],
+            ..Columns::default()
+        };
+        let found = places("1,2,3,4", 1, &columns);
+        assert_eq!(found, [Some(vec![2]), None, Some(vec![1])]);
+        let few = layout("1,2", 1, &columns).unwrap_err().to_string();
+        assert!(few.contains("give a number from 1 to 2"), "{few}");
+        let named = layout("time,q1,tau1", 1, &columns).unwrap_err().to_string();
+        assert!(named.contains("only in a file without a header"), "{named}");
+        // A torque is not passed over because columns have no names.
+        let unsaid = Columns {
+            tau: vec![],
+            ..columns
+        };
+        let message = layout("1,2,3,4", 1, &unsaid).unwrap_err().to_string();
+        assert!(message.contains("time = 1, q = [2]"), "{message}");
+    }
+
+    #[test]
+    fn a_joint_without_a_drive_needs_no_column() {
+        let columns = Columns {
+            tau: vec!["motor".into(), "".into()],
+            ..Columns::default()
+        };
+        let found = layout("time,q1,q2,qd1,qd2,motor", 2, &columns).unwrap();
+        assert_eq!(found.tau, Some(vec![Some(cell(5)), None]));
     }
 
     #[test]

@@ -61,8 +61,9 @@ pub enum LogError {
     Empty { path: PathBuf },
     /// The first line holds numbers.
     #[error(
-        "{path}, {place}: has numbers where the header should be; put column names \
-         such as time,q1,qd1,tau1 above them"
+        "{path}, {place}: has numbers where the header should be; put column names such as time,q1,qd1,tau1 above them, \
+         or give the number of every column, from 1, under [columns] in the model file: time = 1, q = [2], qd = [3], \
+         tau = [4] (qd = [] takes velocities from the angles)"
     )]
     NoHeader {
         path: PathBuf,

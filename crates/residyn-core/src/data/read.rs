@@ -6,6 +6,7 @@ use std::path::Path;
 use super::column::{Quantity, unwrap};
 use super::columns::{Cell, Columns, Header, Layout, joints};
 use super::error::{CellFault, LogError};
+use super::joint::Joint;
 use super::late;
 use super::local_cubic::slopes;
 use super::log::Log;
@@ -41,7 +42,7 @@ impl Log {
             header: &header,
             table,
             numbers: numbers.into_iter(),
-            notes: [table.notes().to_vec(), notes(&layout)].concat(),
+            notes: [table.notes().to_vec(), notes(&layout, columns.driven_by)].concat(),
         };
         let time = readings.time(&layout.time)?;
         let mut channel = |cells: &[Cell]| -> Result<Vec<Vec<f64>>, LogError> {
@@ -50,7 +51,13 @@ impl Log {
         };
         let q = channel(&layout.q)?;
         let qd = layout.qd.as_deref().map(&mut channel).transpose()?;
-        let tau = layout.tau.as_deref().map(&mut channel).transpose()?;
+        let mut driven = |cell: &Option<Cell>| match cell {
+            Some(cell) => readings.channel(cell, &time),
+            None => Ok(vec![0.0; time.len()]),
+        };
+        let tau = layout.tau.as_ref();
+        let tau = tau.map(|cells| cells.iter().map(&mut driven).collect::<Result<_, _>>());
+        let tau = tau.transpose()?;
         let log = Log {
             qd: qd.unwrap_or_else(|| q.iter().map(|q| slopes(&time, q)).collect()),
             tau: tau.unwrap_or_else(|| vec![vec![0.0; time.len()]; joints]),
@@ -274,7 +281,7 @@ fn longest_pause(time: &[f64]) -> Option<Pause> {
     })
 }
 
-fn notes(layout: &Layout) -> Vec<String> {
+fn notes(layout: &Layout, driven_by: Quantity) -> Vec<String> {
     let mut notes = vec![];
     if !layout.ignored.is_empty() {
         let quoted = layout.ignored.iter().map(|name| format!("{name:?}"));
@@ -286,6 +293,13 @@ fn notes(layout: &Layout) -> Vec<String> {
         notes.push(
             "velocities come from the angles: slopes of cubics fitted around each row".to_owned(),
         );
+    }
+    let joints = Joint::all(layout.q.len()).zip(layout.tau.iter().flatten());
+    for (joint, _) in joints.filter(|(_, cell)| cell.is_none()) {
+        let key = driven_by.key();
+        notes.push(format!(
+            "joint {joint} has no column of `{key}`: read as a joint without a drive"
+        ));
     }
     if layout.tau.is_none() {
         notes.push("no torque columns: read as a passive rig, with zero torque".to_owned());

@@ -2,11 +2,11 @@
 
 use super::reader::{FileError, Section};
 use super::tables::ColumnTable;
-use super::values::OrTable;
+use super::values::{ColumnName, OrTable};
 use crate::data::{Column, Columns, Quantity};
 
 /// `"position"`, or `{ column = "position", unit = "deg", factor = -1, wrapped = true, late = 0.004 }`.
-type Entry<'a> = OrTable<String, ColumnTable<'a>>;
+type Entry<'a> = OrTable<ColumnName, ColumnTable<'a>>;
 
 pub(super) fn columns(
     section: Option<Section<'_>>,
@@ -56,12 +56,21 @@ fn list(
         return Err(section.error_at(key, message));
     }
     let columns = entries.into_iter().map(|entry| column(entry, quantity));
-    columns.collect::<Result<_, _>>().map(Some)
+    let columns = columns.collect::<Result<Vec<_>, _>>()?;
+    let may_lack = matches!(quantity, Quantity::Torque | Quantity::Command);
+    if !may_lack && columns.iter().any(Column::is_none) {
+        let message = format!(
+            "`{key}` has a column without a name; give its name or its number: only a joint without a drive has none, under \
+             `tau`"
+        );
+        return Err(section.error_at(key, message));
+    }
+    Ok(Some(columns))
 }
 
 fn column(entry: Entry<'_>, quantity: Quantity) -> Result<Column, FileError> {
     let table = match entry {
-        OrTable::Plain(name) => return Ok(Column::named(name)),
+        OrTable::Plain(ColumnName(name)) => return Ok(Column::named(name)),
         OrTable::Table(table) => table,
     };
     let wrong = |key: &str, message: &str| Err(table.section.error_at(key, message));
@@ -79,7 +88,7 @@ fn column(entry: Entry<'_>, quantity: Quantity) -> Result<Column, FileError> {
     }
     Ok(Column {
         unit: unit(&table, quantity)?,
-        name: table.column,
+        name: table.column.0,
         factor,
         wrapped: table.wrapped,
         late_s,

@@ -8,7 +8,7 @@ use super::effect::ActsOn;
 use super::effect::Measure;
 use super::filter::CommandFilter;
 use super::reader::{Entry, FileError, Located, Section};
-use super::values::{EachLog, Limits, Named, OrTable, Read};
+use super::values::{ColumnName, EachLog, Limits, Named, OrTable, Read};
 use crate::data::TorqueColumn;
 use crate::expr::Formula;
 
@@ -75,7 +75,7 @@ tables! {
 
     /// A column that is not read as it is.
     struct ColumnTable<'a> {
-        column: String,
+        column: ColumnName,
         unit: Option<String>,
         factor: Option<f64>,
         wrapped: bool,

@@ -39,6 +39,9 @@ pub(super) enum OrTable<T, U> {
 /// Two numbers, each infinite if it limits nothing.
 pub(super) struct Limits(pub [f64; 2]);
 
+/// The name of a log's column, or its number, from 1.
+pub(super) struct ColumnName(pub String);
+
 /// What has a separate value of a parameter.
 #[derive(Clone, Copy)]
 pub(super) struct EachLog;
@@ -186,6 +189,20 @@ impl Read<'_> for usize {
         }
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // just checked
         Ok(number as Self)
+    }
+}
+
+impl Read<'_> for ColumnName {
+    const NAMES: [&'static str; 2] = ["a name or a number", "names or numbers"];
+
+    fn read(entry: Entry<'_, '_>) -> Result<Self, FileError> {
+        if !matches!(entry.value(), DeValue::Float(_) | DeValue::Integer(_)) {
+            return String::read(entry).map(Self);
+        }
+        match usize::read(entry)? {
+            0 => Err(entry.error("columns are counted from 1".to_owned())),
+            number => Ok(Self(number.to_string())),
+        }
     }
 }
 

@@ -54,6 +54,11 @@ pub(super) fn drives<'s, 'x>(
             Some(_) => &[FORCE],
         };
         let effort = limit(&drive, autolimits, ranges)?.map(|limit| gear.abs() * limit);
+        if servo.is_some() && effort.is_none() {
+            drive.note(format!(
+                "`{name}` has no force range: its force is not limited"
+            ));
+        }
         drives.insert(joint.to_owned(), Drive { effort, servo });
     }
     Ok(drives)

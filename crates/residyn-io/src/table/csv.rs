@@ -1,8 +1,8 @@
 //! Text tables: CSV and its relatives.
 //!
 //! Accepted silently: a byte order mark, CRLF line ends, spaces around cells, quoted cells and blank lines. Columns are
-//! separated by the character that separates the header's names; decimal commas are read unless the separator is a
-//! comma.
+//! separated by the character that separates the first row's cells, or by spaces; decimal commas are read unless the
+//! separator is a comma. Without a header, the columns' names are their numbers, from 1.
 //!
 //! A text is read row by row and may be larger than the memory: only the numbers of the columns asked for are kept.
 
@@ -25,6 +25,8 @@ pub struct Csv {
     separator: u8,
     head: Place,
     names: Vec<String>,
+    /// Whether the names are those of the first row, and not numbers.
+    has_header: bool,
 }
 
 /// Possible column separators, the most usual first.
@@ -42,9 +44,14 @@ impl Csv {
             separator: b',',
             head: Place::Line(1),
             names: vec![],
+            has_header: true,
         };
         csv.separator = separator(csv.text()?).map_err(|why| csv.unreadable(why))?;
         (csv.head, csv.names) = csv.header()?;
+        csv.has_header = !csv.is_data(&csv.names);
+        if !csv.has_header {
+            csv.names = (1..=csv.names.len()).map(|n| n.to_string()).collect();
+        }
         Ok(csv)
     }
 
@@ -57,6 +64,13 @@ impl Csv {
         };
         let names = header.iter().map(|cell| bare(cell).to_owned()).collect();
         Ok((self.line_from(offset(header))?, names))
+    }
+
+    /// Whether a first row holds numbers already. Some may be missing; then what is missing is said.
+    fn is_data(&self, row: &[String]) -> bool {
+        let is_number = |cell: &&String| self.number(cell).is_ok() || cell.parse::<f64>().is_ok();
+        let mut filled = row.iter().filter(|cell| !cell.is_empty()).peekable();
+        filled.peek().is_some() && filled.all(|cell| is_number(&cell))
     }
 
     /// The text from its beginning, without a byte order mark.
@@ -86,6 +100,15 @@ impl Csv {
             reader,
             row: StringRecord::new(),
         })
+    }
+
+    /// The rows below the header, if there is one.
+    fn data(&self) -> Result<Rows<'_, impl Read + use<>>, LogError> {
+        let mut rows = self.rows()?;
+        if self.has_header {
+            rows.next()?;
+        }
+        Ok(rows)
     }
 
     /// The number in a cell.
@@ -176,8 +199,7 @@ impl Table for Csv {
     fn numbers(&mut self, wanted: &[usize]) -> Result<Numbers, LogError> {
         // A column takes up to twice its bytes while it grows.
         let most_rows = self.most_bytes() / (16 * wanted.len() as u64).max(1);
-        let mut rows = self.rows()?;
-        rows.next()?;
+        let mut rows = self.data()?;
         let mut numbers = Numbers::of(wanted.len());
         while let Some(row) = rows.next()? {
             if numbers.rows as u64 == most_rows {
@@ -197,8 +219,8 @@ impl Table for Csv {
     }
 
     fn place(&self, row: usize) -> Result<Place, LogError> {
-        let mut rows = self.rows()?;
-        for _ in 0..=row {
+        let mut rows = self.data()?;
+        for _ in 0..row {
             rows.next()?;
         }
         let row = rows.next()?;
@@ -221,7 +243,11 @@ impl<R: Read> Rows<'_, R> {
             if !read.map_err(|why| self.csv.fault(why))? {
                 return Ok(None);
             }
-            let is_blank = self.row.len() == 1 && bare(&self.row[0]).is_empty();
+            if self.csv.separator == b' ' {
+                self.drop_empty();
+            }
+            let is_blank =
+                self.row.is_empty() || self.row.len() == 1 && bare(&self.row[0]).is_empty();
             if !is_blank {
                 return Ok(Some(&self.row));
             }
@@ -229,7 +255,19 @@ impl<R: Read> Rows<'_, R> {
     }
 }
 
-/// The column separator of a text: the one most frequent in its first line.
+impl<R> Rows<'_, R> {
+    /// Any number of spaces separates two cells.
+    fn drop_empty(&mut self) {
+        let position = self.row.position().cloned();
+        let cells = self.row.iter().filter(|cell| !cell.is_empty());
+        let mut row: StringRecord = cells.collect();
+        row.set_position(position);
+        self.row = row;
+    }
+}
+
+/// The column separator of a text: the one most frequent in its first line, spaces if there is no other and more than
+/// one number.
 fn separator(text: impl Read) -> io::Result<u8> {
     let mut text = BufReader::new(text.take(TEXT_BYTES));
     let mut first = Vec::new();
@@ -240,7 +278,17 @@ fn separator(text: impl Read) -> io::Result<u8> {
     // In a tie the last one wins: a comma if nothing separates.
     let all = SEPARATORS.into_iter().rev();
     let most = all.max_by_key(|separator| count(*separator));
-    Ok(most.unwrap_or(b','))
+    let most = most.filter(|separator| count(*separator) > 0);
+    Ok(most.unwrap_or(if is_spaced(&first) { b' ' } else { b',' }))
+}
+
+/// Whether spaces separate cells: a line of one name may have some within it.
+fn is_spaced(line: &[u8]) -> bool {
+    std::str::from_utf8(line).is_ok_and(|line| {
+        let mut cells = line.split_whitespace();
+        let numbers = cells.clone().all(|cell| cell.parse::<f64>().is_ok());
+        cells.clone().count() > 1 && (numbers || cells.any(|cell| cell == "time"))
+    })
 }
 
 fn is_blank(line: &[u8]) -> bool {

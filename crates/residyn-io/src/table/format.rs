@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::csv::Csv;
 use super::source::Source;
-use super::{mat, npz, parquet, recording};
+use super::{mat, npy, npz, parquet, recording};
 use residyn_core::data::{Arrays, Columns, LogError, Table};
 
 /// A format of log files.
@@ -42,6 +42,12 @@ pub const LOG_FORMATS: &[LogFormat] = &[
             read: |path, _| npz::read(path),
             packed: "a gzipped .npz is not read; unpack it: `gunzip run.npz.gz`",
         },
+    },
+    LogFormat {
+        name: "npy",
+        about: "logs of NumPy, one matrix whose columns go by their numbers, in",
+        begin: npy::MAGIC,
+        reader: Reader::Bytes(|name, source| Ok(Box::new(npy::read(name, &source)?))),
     },
     LogFormat {
         name: "mat",

@@ -5,6 +5,8 @@ mod budget;
 mod csv;
 #[cfg(feature = "parquet")]
 mod ending;
+#[cfg(feature = "parquet")]
+mod footer;
 mod format;
 #[cfg(feature = "parquet")]
 mod lerobot;

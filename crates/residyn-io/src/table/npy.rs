@@ -4,8 +4,12 @@
 #![warn(clippy::indexing_slicing)]
 
 use std::io::{self, BufReader, ErrorKind, Read};
+use std::path::Path;
 
+use super::arrays::Unpacked;
 use super::budget::Budget;
+use super::source::Source;
+use residyn_core::data::{Arrays, LogError};
 use residyn_core::limits::LOG_COLUMNS;
 
 /// An array whose numbers are still to be read.
@@ -18,9 +22,27 @@ pub(super) struct Array<R> {
     pub numbers: R,
 }
 
-const MAGIC: &[u8; 6] = b"\x93NUMPY";
+pub(super) const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// The longest header; NumPy itself refuses more than 10 000 bytes by default.
 const HEADER: usize = 1 << 16;
+
+/// The matrix in a file, one row per sample: columns 1, 2 ..
+///
+/// # Errors
+/// A file that is damaged, or holds something else than numbers.
+pub(super) fn read(path: &Path, source: &Source) -> Result<Arrays, LogError> {
+    let bytes = source.open().map_err(|why| source.fault(path, why))?;
+    let mut table = Unpacked::of(source.size());
+    let array = Array::of(bytes).filter(|array| array.shape.len() == 2);
+    let array = array.ok_or_else(|| {
+        let fault = "is not a matrix of NumPy; save one row per sample, and one column per channel";
+        LogError::form(path, fault)
+    })?;
+    match table.add("", array) {
+        Ok(()) => Ok(table.table),
+        Err(fault) => Err(LogError::form(path, fault)),
+    }
+}
 
 impl<R: Read> Array<R> {
     /// `None` if it is not an array.

@@ -12,6 +12,7 @@ use parquet::schema::types::Type;
 
 use super::budget::too_large;
 use super::ending::Ending;
+use super::footer;
 use crate::files;
 use residyn_core::data::Arrays;
 use residyn_core::data::LogError;
@@ -144,6 +145,7 @@ pub(super) fn lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec
 fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>, ParquetError> {
     let file = files::open(path)?;
     let most = unpacked_bytes(file.metadata()?.len());
+    footer::check(&file)?;
     let reader = SerializedFileReader::new(Ending(file))?;
     check_size(&reader, most)?;
     let schema = reader.metadata().file_metadata().schema().clone();
@@ -169,12 +171,20 @@ fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>
 }
 
 /// Check that the cells of all columns take at most `most` bytes, counted in the pages, since a packed page may hold
-/// any number of cells, whatever the description of the file says.
+/// any number of cells, whatever the description of the file says; and that there are no more columns than a log has,
+/// since the reader takes memory for each.
 fn check_size(reader: &SerializedFileReader<Ending>, most: u64) -> Result<(), ParquetError> {
     let described = reader.metadata().file_metadata();
-    let columns = described.schema().get_fields().len() as u64;
-    let rows = described.num_rows().cast_unsigned();
-    check_cells(rows.saturating_mul(columns), most)?;
+    let columns = described.schema_descr().num_columns();
+    if columns > LOG_COLUMNS {
+        let message = format!("has {columns} columns; at most {LOG_COLUMNS} are read");
+        return Err(ParquetError::General(message));
+    }
+    let groups = reader.metadata().row_groups().iter();
+    let rows = groups.map(|group| group.num_rows().cast_unsigned());
+    let rows = rows.fold(0, u64::saturating_add);
+    let rows = rows.max(described.num_rows().cast_unsigned());
+    check_cells(rows.saturating_mul(columns.max(1) as u64), most)?;
     let mut of_pages = 0_u64;
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group)?;

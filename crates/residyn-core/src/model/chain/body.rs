@@ -1,5 +1,6 @@
 use nalgebra::{Matrix3, Vector3};
 
+use super::model_file::LIMIT;
 use super::recursive::Place;
 use super::{Inertia, Pose, turn};
 use crate::data;
@@ -130,6 +131,43 @@ impl Chain {
         leaders
             .enumerate()
             .map(|(k, joint)| (data::Joint::at(k), joint))
+    }
+
+    /// The chain with this drive at every joint. A note names the joints whose limit nobody has given.
+    #[must_use]
+    pub fn driven_by(mut self, drive: ReadyDrive) -> Self {
+        let is_open = |joint: &&Joint| joint.drivetrain.effort.is_none() && joint.follows.is_none();
+        let open = self.joints.iter().filter(is_open);
+        let open: Vec<&str> = open.map(|joint| joint.name.as_str()).collect();
+        if drive.has(LIMIT) && !open.is_empty() {
+            self.notes.push(format!(
+                "the file gives no effort limit of {}: `{LIMIT}` of the drive is an example; write the rig's in its place",
+                open.join(", ")
+            ));
+        }
+        self.drive = Some(drive);
+        self
+    }
+
+    /// The chain without damping, dry friction and rotors. A note has the values that are left out.
+    #[must_use]
+    pub fn with_bare_joints(mut self) -> Self {
+        for joint in &mut self.joints {
+            let own = &mut joint.drivetrain;
+            let parts = [
+                ("damping", &mut own.damping),
+                ("dry friction", &mut own.friction),
+                ("rotor inertia", &mut own.armature),
+            ];
+            let parts = parts.into_iter().filter(|(_, value)| **value != 0.0);
+            let left = parts.map(|(name, value)| format!("{name} {}", std::mem::take(value)));
+            let left: Vec<String> = left.collect();
+            if !left.is_empty() {
+                let note = format!("left out of joint {}: {}", joint.name, left.join(", "));
+                self.notes.push(note);
+            }
+        }
+        self
     }
 }
 

@@ -15,9 +15,11 @@ use crate::data;
 use crate::model::ready_drive::write_plain;
 use crate::model::{Library, ReadyDrive};
 
-/// The drive of a position loop, and the drive parameter that is the effort limit.
+/// The drives of a position loop: with an effort limit, and without.
 const SERVO: &str = "position_servo";
-const LIMIT: &str = "limit";
+const UNLIMITED_SERVO: &str = "position_loop";
+/// The drive parameter that is the effort limit.
+pub(super) const LIMIT: &str = "limit";
 
 const ABOUT: &str = "equations derived from the description of a serial mechanism";
 
@@ -64,9 +66,10 @@ fn with_drives(text: String, chain: &Chain) -> String {
 
 /// What drives a joint, unless a torque does.
 fn drive_of(chain: &Chain, joint: &Joint) -> Option<ReadyDrive> {
-    let servo = || ReadyDrive::find(Library::drives(), SERVO).expect("an embedded drive");
-    let given = || joint.drivetrain.servo.map(|_| servo());
-    chain.drive.clone().or_else(given)
+    let Drivetrain { servo, effort, .. } = joint.drivetrain;
+    let name = effort.map_or(UNLIMITED_SERVO, |_| SERVO);
+    let own = || ReadyDrive::find(Library::drives(), name).expect("an embedded drive");
+    chain.drive.clone().or_else(|| servo.map(|_| own()))
 }
 
 fn head(chain: &Chain) -> String {
