@@ -13,6 +13,7 @@ pub fn together(said: impl IntoIterator<Item = (String, String)>) -> Vec<Togethe
     let mut once: Vec<Together> = Vec::new();
     for (log, text) in said {
         match once.iter_mut().find(|known| known.text == text) {
+            Some(known) if known.logs.last() == Some(&log) => {}
             Some(known) => known.logs.push(log),
             None => once.push(Together {
                 text,
@@ -45,5 +46,7 @@ mod tests {
         let said = together(same.chain(own));
         let about: Vec<String> = said.iter().map(|one| one.about(60)).collect();
         assert_eq!(about, ["in 60 of 60 logs", "run3.csv", "run4.csv"]);
+        let twice = [0, 0].map(|k| (names(k), "jumps".to_owned()));
+        assert_eq!(together(twice)[0].about(60), "run0.csv");
     }
 }
