@@ -100,7 +100,8 @@ fn the_example_of_a_limit_is_said_to_be_one() {
     let scratch = Scratch::new();
     let drawn = arm("", "")
         .replace("<position", "<motor")
-        .replace("kp=", "kv=");
+        .replace(" kp=\"60\" kv=\"2\"", "")
+        .replace(" kp=\"25\" kv=\"0.8\"", "");
     scratch.file("arm.xml", drawn.replace(" forcerange=\"-12 12\"", ""));
     let line = "new --from-mjcf arm.xml --tip fore --drive position_servo --out arm.toml";
     let wanted = "no effort limit of shoulder: `limit` of the drive is an example";

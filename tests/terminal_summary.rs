@@ -132,7 +132,8 @@ fn arm(mut report: Value, compared: &str) -> Value {
     let long = LONG.repeat(12);
     report["reason"] = json!(long);
     let found = json!({"severity": "serious", "text": long});
-    report["audit"][0]["findings"] = json!([found, found]);
+    let other = json!({"severity": "serious", "text": "another"});
+    report["audit"][0]["findings"] = json!([found, other]);
     report["identifiability"]["held"] = held().into();
     let rival = json!({
         "effects": [{"name": "x", "joint": 1, "label": "x on joint 1"}], "title": "stribeck_friction",

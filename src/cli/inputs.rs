@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::Args;
 
 use super::{remedy, terminal};
-use residyn_core::data::{Audit, LeaveOut, Log, leave_out};
+use residyn_core::data::{Audit, Finding, LeaveOut, Log, leave_out, together};
 use residyn_core::limits::RUNS;
 use residyn_core::model::check::Severity;
 use residyn_core::model::{Library, Model};
@@ -111,19 +111,32 @@ pub(super) fn print_findings(path: &Path, model: &Model, seed: u64) {
 
 /// Print the notes of logs on standard error.
 pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
-    for log in logs {
-        for note in &log.notes {
-            terminal::say(format!("note: {}: {note}", log.name()));
-        }
+    let logs: Vec<&Log> = logs.into_iter().collect();
+    let of_log = |log: &&Log| {
+        let name = log.name();
+        let notes = log.notes.iter();
+        notes
+            .map(move |note| (name.clone(), note.clone()))
+            .collect::<Vec<_>>()
+    };
+    for note in together(logs.iter().flat_map(of_log)) {
+        terminal::say(format!("note: {}: {}", note.about(logs.len()), note.text));
     }
 }
 
 /// Print on standard error what is serious about logs, before anything is computed from them.
 pub(super) fn print_faults<'a>(audits: impl IntoIterator<Item = &'a Audit>) {
-    for audit in audits {
-        for finding in audit.serious() {
-            let message = finding.message(&remedy::of_finding);
-            terminal::say(format!("serious: {}: {message}", audit.log));
-        }
+    let audits: Vec<&Audit> = audits.into_iter().collect();
+    let of_audit = |audit: &&'a Audit| {
+        let (log, serious) = (audit.log.clone(), audit.serious());
+        let message = |finding: &Finding| finding.message(&remedy::of_finding);
+        serious.map(move |finding| (log.clone(), message(finding)))
+    };
+    for fault in together(audits.iter().flat_map(of_audit)) {
+        terminal::say(format!(
+            "serious: {}: {}",
+            fault.about(audits.len()),
+            fault.text
+        ));
     }
 }

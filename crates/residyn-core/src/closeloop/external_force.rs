@@ -5,7 +5,7 @@ use super::diagnostics::ForceSample;
 use super::problem::Problem;
 use super::settings::NoteSettings;
 use crate::data::statistics::{SIGMA_PER_MAD, median};
-use crate::data::{Audit, Finding, Interval, Joint, Severity};
+use crate::data::{Audit, Finding, Interval, Joint, Quantity, Severity};
 
 /// One external force on one joint.
 #[derive(Debug)]
@@ -29,9 +29,10 @@ pub(super) fn report_external_forces(
     let settings = &problem.settings.notes;
     let block_s = problem.settings.diagnostics.block_s;
     for joint in Joint::all(problem.declared.joints) {
+        let unit = problem.declared.columns.unit(Quantity::Torque, joint);
         let least = settings.push_torque * problem.top_torque[joint];
         for push in pushes(forces, joint, (block_s, least), settings) {
-            audits[push.log].add(push.finding(&problem.logs[push.log].name()));
+            audits[push.log].add(push.finding(&problem.logs[push.log].name(), unit));
         }
     }
 }
@@ -72,14 +73,14 @@ fn pushes(
 }
 
 impl ExternalForce {
-    fn finding(&self, log: &str) -> Finding {
+    fn finding(&self, log: &str, unit: &str) -> Finding {
         let rounded = |t: f64| (100.0 * t).round() / 100.0;
         let span = Interval {
             start_s: rounded(self.span.start_s),
             end_s: rounded(self.span.end_s),
         };
         let text = format!(
-            "from {span} the model follows joint {} only with an additional force of up to {:.3} N m (N), {:.0} times \
+            "from {span} the model follows joint {} only with an additional force of up to {:.3} {unit}, {:.0} times \
              what it needs elsewhere: did something push or touch the rig? If so, leave this interval out",
             self.joint, self.force, self.times
         );

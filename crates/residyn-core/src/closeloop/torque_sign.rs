@@ -10,7 +10,8 @@ impl Problem<'_> {
     /// shows it.
     pub(super) fn report_reversed(&self, usual: Option<&Fitted>, audits: &mut [Audit]) {
         let key = self.declared.driven_by().key();
-        if !self.moves() || audits.iter().any(|audit| mends(audit, key)) {
+        let is_mended = audits.iter().any(|audit| mends(audit, key));
+        if !self.moves() || is_mended || follow_torques(self.audits()) {
             return;
         }
         let reversed: Vec<Log> = self.logs.iter().map(reversed).collect();
@@ -32,6 +33,15 @@ impl Problem<'_> {
                 .for_each(|audit| audit.add(finding.clone()));
         }
     }
+}
+
+/// Whether accelerations follow the torques as logged rather than their opposite, over all joints and logs. A fit that
+/// has failed, as fits of joints that mostly rest do, may leave a larger error than any with other signs; what the logs
+/// show by themselves is not overruled by it.
+fn follow_torques(audits: &[Audit]) -> bool {
+    let joints = audits.iter().flat_map(|audit| &audit.joints);
+    let to_torque = joints.filter_map(|joint| joint.response?.to_torque);
+    to_torque.sum::<f64>() > 0.0
 }
 
 /// Whether an audit already proposes another remedy for the columns that drive the joints.

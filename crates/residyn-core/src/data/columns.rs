@@ -30,6 +30,8 @@ pub struct Columns {
     /// Names of the joints, if they have any. A standard column that a header lacks may go by the name of its joint:
     /// `q_elbow` for `q2`.
     pub joint_names: Vec<String>,
+    /// Whether each joint slides: its columns are then in m, m/s and N. Where it is shorter than the joints, they turn.
+    pub slides: Vec<bool>,
 }
 
 impl Default for Columns {
@@ -44,6 +46,7 @@ impl Default for Columns {
             torque: None,
             topic: None,
             joint_names: vec![],
+            slides: vec![],
         }
     }
 }
@@ -58,6 +61,19 @@ impl Columns {
             driven_by,
             ..Self::default()
         }
+    }
+
+    /// The unit of a joint's angle or length, velocity, or torque or force; none for a command.
+    pub(crate) fn unit(&self, quantity: Quantity, joint: Joint) -> &'static str {
+        let slides = self.slides.get(joint.index()).copied().unwrap_or(false);
+        let [of_turning, of_sliding] = match quantity {
+            Quantity::Time => ["s", "s"],
+            Quantity::Angle => ["rad", "m"],
+            Quantity::Velocity => ["rad/s", "m/s"],
+            Quantity::Torque => ["N m", "N"],
+            Quantity::Command => ["", ""],
+        };
+        if slides { of_sliding } else { of_turning }
     }
 
     /// The columns of a quantity, one for each joint except for the time.
@@ -228,10 +244,15 @@ impl Header<'_> {
     pub fn layout(&self, joints: usize, columns: &Columns) -> Result<Layout, LogError> {
         let columns = columns.completed(joints, self.path)?;
         self.check_is_a_header(&columns)?;
+        let Columns {
+            time, q, qd, tau, ..
+        } = Columns::standard(joints, columns.driven_by);
         let standard = Columns {
-            topic: columns.topic.clone(),
-            joint_names: columns.joint_names.clone(),
-            ..Columns::standard(joints, columns.driven_by)
+            time,
+            q,
+            qd,
+            tau,
+            ..columns.clone()
         };
         if columns == standard {
             self.check_joint_count(joints)?;

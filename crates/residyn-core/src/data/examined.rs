@@ -84,6 +84,7 @@ impl Log {
             all.iter().filter_map(place).collect()
         };
         Log {
+            is_qd_derived: self.is_qd_derived,
             path: self.path.clone(),
             time: cut(&self.time),
             q: self.q.iter().map(cut).collect(),

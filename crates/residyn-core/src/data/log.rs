@@ -61,6 +61,8 @@ pub struct Log {
     pub q: Vec<Vec<f64>>,
     /// Joint velocities \[rad/s\] as the rig reports them.
     pub qd: Vec<Vec<f64>>,
+    /// Whether the velocities are slopes of the angles, since no column holds any.
+    pub is_qd_derived: bool,
     /// What drives the joints: torques \[N m\] or commands; row i acts from `time[i]` to `time[i + 1]`,
     /// unless `torque` says otherwise.
     pub tau: Vec<Vec<f64>>,
@@ -88,6 +90,7 @@ impl Log {
             time: Vec::new(),
             q: vec![Vec::new(); joints],
             qd: vec![Vec::new(); joints],
+            is_qd_derived: false,
             tau: vec![Vec::new(); joints],
             driven_by: Quantity::Torque,
             torque: TorqueColumn::Held,

@@ -32,6 +32,7 @@ mod smooth;
 mod standstill;
 pub mod statistics;
 mod table;
+mod together;
 pub(crate) mod torque_column;
 mod trajectory;
 
@@ -54,5 +55,6 @@ pub use local_cubic::{LocalCubic, half_width_s, local_cubic};
 pub use log::{Interval, Log};
 pub use smooth::{Smooth, Smoothing};
 pub use table::{Arrays, Numbers, Numeric, Table};
+pub use together::{Together, together};
 pub use torque_column::TorqueColumn;
 pub use trajectory::{Thinning, Trajectory, trajectories};

@@ -59,6 +59,7 @@ impl Log {
         let tau = tau.map(|cells| cells.iter().map(&mut driven).collect::<Result<_, _>>());
         let tau = tau.transpose()?;
         let log = Log {
+            is_qd_derived: qd.is_none(),
             qd: qd.unwrap_or_else(|| q.iter().map(|q| slopes(&time, q)).collect()),
             tau: tau.unwrap_or_else(|| vec![vec![0.0; time.len()]; joints]),
             driven_by: columns.driven_by,

@@ -47,6 +47,7 @@ impl Model {
             name: system.name,
             about: system.about.unwrap_or_default(),
             columns: Columns {
+                slides: prismatic.clone(),
                 torque: file.log.and_then(|log| log.torque),
                 ..columns(file.columns, joints, driven_by, &system.joint_names)?
             },

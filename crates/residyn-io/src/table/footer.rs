@@ -239,9 +239,9 @@ mod tests {
         for length in 0..whole.len() {
             assert!(refused(&whole[..length]).contains("cut off"), "{length}");
         }
-        let many = [0x19, 0xf1, 0xff, 0xff, 0xff, 0xff, 0x07, 0];
+        let many = [0x19, 0xfc, 0xff, 0xff, 0xff, 0xff, 0x07, 0];
         assert!(refused(&many).contains("cut off"));
-        let many_booleans = [0x39, 0xf1, 0xff, 0xff, 0xff, 0xff, 0x07, 0];
+        let many_booleans = [0x19, 0xf1, 0xff, 0xff, 0xff, 0xff, 0x07, 0];
         assert!(refused(&many_booleans).contains("too many booleans"));
         assert!(refused(&[0x1c; 100]).contains("too deep"));
         assert!(refused(&[0x1f, 0]).contains("unknown type"));

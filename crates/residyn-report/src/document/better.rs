@@ -122,7 +122,10 @@ fn of_torques(report: &Report, errors: &TorqueErrors) -> Vec<Block> {
         bootstrapped(errors.reduction_ci95, "error"),
         repeated(report),
     ];
-    let about = "Root mean square of their difference from the logged ones, both low-passed, in N m (N where a joint slides).";
+    let about = format!(
+        "Root mean square of their difference from the logged ones, both low-passed, in {}.",
+        force_unit(report)
+    );
     let title = heading("Torques that the motion needs");
     let remarks = paragraphs(remarks.into_iter().flatten());
     [vec![title, paragraph(about), table], remarks].concat()
@@ -252,10 +255,20 @@ fn about_motion(report: &Report) -> String {
 
 /// The unit of positions: the one that all joints share, or both.
 pub(crate) fn position_unit(report: &Report) -> &'static str {
+    of_joints(report, ["rad", "m", "rad or m"])
+}
+
+/// The unit of torques and forces, in the same way.
+pub(crate) fn force_unit(report: &Report) -> &'static str {
+    of_joints(report, ["N m", "N", "N m (N where a joint slides)"])
+}
+
+/// The first if all joints turn, the second if all slide, or else the third.
+fn of_joints(report: &Report, [turning, sliding, both]: [&'static str; 3]) -> &'static str {
     match report.prismatic.iter().filter(|slides| **slides).count() {
-        0 => "rad",
-        all if all == report.prismatic.len() => "m",
-        _ => "rad or m",
+        0 => turning,
+        all if all == report.prismatic.len() => sliding,
+        _ => both,
     }
 }
 
@@ -311,7 +324,7 @@ fn of_test_logs(report: &Report) -> Vec<Block> {
             position_unit(report)
         ),
         ErrorModel::InverseDynamics => {
-            "Torque errors on each test log, in N m (N where a joint slides).".to_owned()
+            format!("Torque errors on each test log, in {}.", force_unit(report))
         }
     };
     let of_log = |TestLog { log, before, after }: &TestLog| -> Vec<Vec<Cell>> {

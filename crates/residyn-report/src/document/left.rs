@@ -16,10 +16,11 @@ pub(super) fn left(report: &Report) -> Vec<Block> {
         ),
     };
     let size = format!(
-        "Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over blocks of {} s in N m or N.",
+        "Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over blocks of {} s in {}.",
         force(norm.before),
         force(norm.after),
-        report.settings.diagnostics.block_s
+        report.settings.diagnostics.block_s,
+        super::force_unit(report)
     );
     let said = [Some(structure(report)), network(report), Some(size)];
     let said = paragraphs(said.into_iter().flatten());

@@ -18,8 +18,9 @@ use super::json::PLOTS;
 use super::page;
 use super::schema::{ParameterEntry, Report};
 use super::wording::{amount, capitalised};
+use residyn_core::data::together;
 
-pub(super) use better::{fitted_tests, position_unit, removed};
+pub(super) use better::{fitted_tests, force_unit, position_unit, removed};
 pub(super) use calibration::alarms;
 pub(super) use left::{proposal_line, structure};
 pub(super) use made::of_call;
@@ -116,9 +117,12 @@ pub(super) fn document(report: &Report) -> Document {
 
 /// Findings that make results wrong unless they are fixed, then why the answer is as it is.
 fn head(report: &Report) -> Vec<Block> {
-    let serious = report
-        .serious()
-        .map(|(log, finding)| Block::Serious(format!("**{log}**, to be fixed first: {finding}")));
+    let said = report.serious();
+    let said = together(said.map(|(log, finding)| (log.to_owned(), finding.to_string())));
+    let serious = said.into_iter().map(|one| {
+        let about = one.about(report.audit.len());
+        Block::Serious(format!("**{about}**, to be fixed first: {}", one.text))
+    });
     let reason = paragraph(format!("{}.", capitalised(&report.reason)));
     serious.chain([reason]).collect()
 }

@@ -10,7 +10,7 @@ use crate::schema::{
     Report, TriedEntry,
 };
 use crate::wording::{FITTED, WITH_EFFECTS, amount, listed, reduction, small};
-use residyn_core::data::{Finding, Severity};
+use residyn_core::data::{Finding, Severity, Together, together};
 
 pub(super) fn answer(report: &Report) -> Vec<Block> {
     let calibration = report.calibration.as_ref().map(calibration);
@@ -211,19 +211,35 @@ fn ended(name: &str, fit: &FitEntry) -> String {
     )
 }
 
-/// What the audit found in each log, except for remarks; logs without findings are left out.
+/// What the audit found, except for remarks: in several logs alike, then in each; logs without findings are left out.
 fn findings(report: &Report) -> Vec<Block> {
     let of_log = |audit: &AuditEntry| {
         let matters = |finding: &&Finding| finding.severity != Severity::Info;
         let findings = audit.findings.iter().filter(matters);
-        let findings: Vec<String> = findings.map(Finding::to_string).collect();
-        let plural = if findings.len() == 1 { "" } else { "s" };
-        let about = format!("{}: {} finding{plural}", audit.log, findings.len());
-        (!findings.is_empty()).then(|| folded(about, vec![Block::List(findings)]))
+        let log = audit.log.clone();
+        let said = findings.map(|finding| (log.clone(), finding.to_string()));
+        said.collect::<Vec<_>>()
     };
-    let mut found: Vec<Block> = report.audit.iter().filter_map(of_log).collect();
+    let said = together(report.audit.iter().flat_map(of_log));
+    let (shared, own): (Vec<Together>, Vec<Together>) =
+        said.into_iter().partition(|one| one.logs.len() > 1);
+    let about = |one: Together| format!("{}: {}", one.about(report.audit.len()), one.text);
+    let shared = listed_findings("several logs", shared.into_iter().map(about).collect());
+    let of_log = |audit: &AuditEntry| {
+        let own = own.iter().filter(|one| one.logs[0] == audit.log);
+        listed_findings(&audit.log, own.map(|one| one.text.clone()).collect())
+    };
+    let each = report.audit.iter().filter_map(of_log);
+    let mut found: Vec<Block> = shared.into_iter().chain(each).collect();
     if found.is_empty() {
         found.push(paragraph("The audit found nothing to warn about."));
     }
     [vec![heading("The logs")], found].concat()
+}
+
+/// What was found in `place`, if anything was.
+fn listed_findings(place: &str, findings: Vec<String>) -> Option<Block> {
+    let plural = if findings.len() == 1 { "" } else { "s" };
+    let about = format!("{place}: {} finding{plural}", findings.len());
+    (!findings.is_empty()).then(|| folded(about, vec![Block::List(findings)]))
 }

@@ -1,7 +1,7 @@
 //! How much better: errors on the test logs, one row per joint.
 
 use super::{listed, paragraph};
-use crate::document::{fitted_tests, position_unit, removed};
+use crate::document::{fitted_tests, force_unit, position_unit, removed};
 use crate::schema::{ModelError, Report};
 use crate::wording::{WITH_FRICTION, small};
 use residyn_core::closeloop::{ErrorModel, TorqueErrors};
@@ -51,7 +51,7 @@ fn of_torques(report: &Report, errors: &TorqueErrors) -> Vec<String> {
     let friction = errors.with_friction.as_ref();
     rows.extend(friction.map(|model| format!("  {WITH_FRICTION} alone: {}", model.share())));
     table(
-        "Torque errors on the test logs, N m",
+        &format!("Torque errors on the test logs, {}", force_unit(report)),
         rows,
         errors.reduction_ci95,
     )

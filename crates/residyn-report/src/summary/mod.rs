@@ -11,7 +11,7 @@ use super::document::values;
 use super::json::PAGE;
 use super::schema::{EffectEntry, Report};
 use residyn_core::closeloop::Stage;
-use residyn_core::data::Remedy;
+use residyn_core::data::{Finding, Remedy, together};
 use residyn_core::layout::wrap;
 
 pub use self::curves::curves;
@@ -69,14 +69,16 @@ pub fn summary(
 
 /// What is serious about the logs, then the answer.
 fn head(report: &Report, words: &Words<'_>) -> Vec<String> {
-    let mut serious = report.serious();
-    let first = serious.next().map(|(log, finding)| {
-        let more = match serious.count() {
+    let serious = report.serious();
+    let said = |(log, finding): (&str, &Finding)| (log.to_owned(), finding.message(words.remedy));
+    let serious = together(serious.map(said));
+    let first = serious.first().map(|first| {
+        let more = match serious.len() - 1 {
             0 => String::new(),
             more => format!(" (and {more} more in report.md)"),
         };
-        let message = finding.message(words.remedy);
-        format!("Serious, to be fixed first{more}: {log}: {message}")
+        let about = first.about(report.audit.len());
+        format!("Serious, to be fixed first{more}: {about}: {}", first.text)
     });
     let first = first.map_or_else(Vec::new, |text| paragraph("", &text));
     [first, paragraph("", &answer(report))].concat()

@@ -11,6 +11,8 @@ use crate::data::statistics::ends;
 pub struct Channel {
     /// Standard name, such as `qd1`.
     pub name: String,
+    /// Unit of its numbers; empty for a command.
+    pub unit: &'static str,
     /// Smallest value.
     pub min: f64,
     /// Largest value.
@@ -37,7 +39,7 @@ pub struct Channel {
 impl Channel {
     /// Measures one column with at least one row. `spikes` is counted by the caller, as its meaning
     /// depends on the kind of channel.
-    pub(super) fn of(name: String, values: &[f64], spikes: usize) -> Self {
+    pub(super) fn of(name: String, unit: &'static str, values: &[f64], spikes: usize) -> Self {
         let [min, max] = ends(values);
         let examined = at_examined(values);
         let resolution = resolution(&examined);
@@ -48,6 +50,7 @@ impl Channel {
         let reached = at_limits.iter().filter(|(_, rows)| *rows > 0);
         Self {
             name,
+            unit,
             min,
             max,
             resolution,
@@ -102,7 +105,7 @@ mod tests {
         let values: Vec<f64> = (0..5000)
             .map(|i| change((f64::from(i) * 0.01).sin()))
             .collect();
-        Channel::of("tau1".to_owned(), &values, 0).saturated_fraction
+        Channel::of("tau1".to_owned(), "N m", &values, 0).saturated_fraction
     }
 
     #[test]

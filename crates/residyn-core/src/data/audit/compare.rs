@@ -29,9 +29,14 @@ const MIN_TORQUE_CORRELATION: f64 = 0.5;
 /// that regression and shows spurious lags: a single sine is the usual case.
 const MIN_UNEXPLAINED: f64 = 0.02;
 
-/// An acceleration cannot precede its torque, except for errors of the time stamps, which are below this many samples.
-/// A controller's torque does trail the motion, but that is not the lag sought.
+/// How far the agreement is followed to where the acceleration precedes the torque, samples: a torque that is a mean
+/// over the last period acted half a step before its row, and time stamps have errors.
 const MAX_TORQUE_LEAD: isize = 2;
+
+/// An acceleration cannot precede its torque by more than this many steps, a mean's half and the half that holding adds:
+/// beyond, the torque follows the motion, of a controller or of a joint that sticks and slips, and there is no lag to
+/// measure.
+const MAX_LEAD_STEPS: f64 = 1.0;
 
 /// The logged velocity against the derivative of the logged angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -180,8 +185,10 @@ pub(super) fn torque_lag(
     let lags = -MAX_TORQUE_LEAD..=reach(step_s);
     let found = lag(&tau, &acceleration, &basis, lags)?;
     let clear = found.correlation >= MIN_TORQUE_CORRELATION && !found.at_edge;
-    clear.then_some(TorqueLag {
-        lag_s: found.samples * lag_step_s(step_s) - 0.5 * step_s,
+    let lag_s = found.samples * lag_step_s(step_s) - 0.5 * step_s;
+    let is_cause = lag_s >= -MAX_LEAD_STEPS * step_s;
+    (clear && is_cause).then_some(TorqueLag {
+        lag_s,
         correlation: found.correlation,
     })
 }
@@ -201,10 +208,11 @@ fn unexplained_share(columns: &[Vec<f64>], series: &[f64]) -> f64 {
 mod tests {
     use super::super::joint::{JointAudit, audit_joints};
     use super::super::tests::{each, edited, one_joint, swing, uniform};
+    use crate::data::Columns;
     use crate::data::log::Log;
 
     fn joint(log: &Log) -> JointAudit {
-        audit_joints(log).0.remove(0)
+        audit_joints(log, &Columns::default()).0.remove(0)
     }
 
     #[test]
@@ -272,6 +280,13 @@ mod tests {
             let off_s = found.lag_s - 0.002 * delay as f64;
             assert!(off_s.abs() < 5e-4, "{delay}: {found:?}");
         }
+    }
+
+    #[test]
+    fn a_torque_that_follows_the_motion_has_no_lag() {
+        let mut log = driven(0);
+        log.tau[0].rotate_right(2);
+        assert_eq!(joint(&log).torque_lag, None);
     }
 
     #[test]

@@ -65,10 +65,14 @@ mod tests {
     use super::super::joint::audit_joints;
     use super::super::tests::{each, edited, swing};
     use super::TorqueDemand;
+    use crate::data::Columns;
     use crate::data::log::Log;
 
     fn demand(log: &Log) -> Option<TorqueDemand> {
-        audit_joints(log).0.remove(0).torque_demand
+        audit_joints(log, &Columns::default())
+            .0
+            .remove(0)
+            .torque_demand
     }
 
     #[test]

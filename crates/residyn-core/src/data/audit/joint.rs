@@ -14,6 +14,7 @@ use super::regression::Regression;
 use super::response::{Response, response};
 use crate::data::Joint;
 use crate::data::column::Quantity;
+use crate::data::columns::Columns;
 use crate::data::jumps::rows_that_jump;
 use crate::data::local_cubic::{LocalCubic, half_width_s};
 use crate::data::log::{Interval, Log};
@@ -34,7 +35,7 @@ const SLOW_S: f64 = 0.05;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct JointAudit {
     pub joint: Joint,
-    /// The angle \[rad\].
+    /// The angle \[rad\], or the length of a joint that slides \[m\]; its other numbers are in m, m/s and N as well.
     pub q: Channel,
     /// The velocity as logged \[rad/s\].
     pub qd: Channel,
@@ -85,7 +86,7 @@ pub struct JointAudit {
 /// Audits every joint of a log, and follows the motions in which accelerations are compared with torques.
 ///
 /// Angles that jump for a single row are counted, and then masked.
-pub(super) fn audit_joints(log: &Log) -> (Vec<JointAudit>, Vec<Motion>) {
+pub(super) fn audit_joints(log: &Log, columns: &Columns) -> (Vec<JointAudit>, Vec<Motion>) {
     let jumps: Vec<Vec<usize>> = log.q.iter().map(|q| rows_that_jump(q)).collect();
     let log = &*log.without(&jumps);
     let step_s = log.median_step();
@@ -97,7 +98,7 @@ pub(super) fn audit_joints(log: &Log) -> (Vec<JointAudit>, Vec<Motion>) {
     let mut joints: Vec<JointAudit> = Joint::all(log.joints())
         .zip(&smoothed(half_width_s(step_s)))
         .zip(jumps)
-        .map(|((joint, motion), jumps)| JointAudit::of(log, step_s, joint, motion, jumps))
+        .map(|((joint, motion), jumps)| JointAudit::of(log, columns, joint, motion, jumps))
         .collect();
     let slow_s = half_width_s(step_s).max(SLOW_S);
     let slow = smoothed(slow_s);
@@ -117,6 +118,11 @@ pub(super) fn audit_joints(log: &Log) -> (Vec<JointAudit>, Vec<Motion>) {
 }
 
 impl JointAudit {
+    /// Whether it slides rather than turns.
+    pub(super) fn slides(&self) -> bool {
+        self.q.unit == "m"
+    }
+
     /// Whether the joint moves visibly in this log.
     pub fn moves(&self) -> bool {
         let visible = VISIBLE_STEPS * self.q.resolution.max(self.q.noise_std);
@@ -124,11 +130,25 @@ impl JointAudit {
     }
 
     /// Everything except what needs the other joints as well, or the log as it is.
-    fn of(log: &Log, step_s: f64, joint: Joint, motion: &Motion, jumping: Vec<usize>) -> Self {
+    fn of(
+        log: &Log,
+        columns: &Columns,
+        joint: Joint,
+        motion: &Motion,
+        jumping: Vec<usize>,
+    ) -> Self {
+        let step_s = log.median_step();
         let (q, qd, tau) = (&log.q[joint], &log.qd[joint], &log.tau[joint]);
-        let channel = |kind: &str, values, spikes| Channel::of(joint.name(kind), values, spikes);
-        let q_channel = channel("q", q, jumping.len());
-        let qd_channel = channel("qd", qd, 0);
+        let channel = |of: Quantity, values, spikes| {
+            Channel::of(
+                joint.name(of.key()),
+                columns.unit(of, joint),
+                values,
+                spikes,
+            )
+        };
+        let q_channel = channel(Quantity::Angle, q, jumping.len());
+        let qd_channel = channel(Quantity::Velocity, qd, 0);
         let spiky = rows_that_jump(tau);
         // A log too short for derivatives still has a speed: the logged one.
         let (rows, velocity) = match motion.rows() {
@@ -162,7 +182,7 @@ impl JointAudit {
             reversals: reversals(velocity, rest_rad_s),
             share_at_rest: resting.len() as f64 / speeds.len().max(1) as f64,
             fast_rad_s,
-            covers_full_turn: q_channel.range() >= std::f64::consts::TAU,
+            covers_full_turn: q_channel.unit == "rad" && q_channel.range() >= std::f64::consts::TAU,
             repeated_fraction: repeats.len() as f64 / moving.len().max(1) as f64,
             disagreeing: log.intervals(disagreeing.iter().copied()),
             at_rest: log.intervals(resting),
@@ -172,7 +192,7 @@ impl JointAudit {
                 spikes: disagreeing.len(),
                 ..qd_channel
             },
-            tau: channel(log.driven_by.key(), tau, spiky.len()),
+            tau: channel(log.driven_by, tau, spiky.len()),
             spiky: log.intervals(spiky),
             jumping,
         }
@@ -202,7 +222,7 @@ mod tests {
     use super::*;
 
     fn joint(log: &Log) -> JointAudit {
-        audit_joints(log).0.remove(0)
+        audit_joints(log, &Columns::default()).0.remove(0)
     }
 
     #[test]

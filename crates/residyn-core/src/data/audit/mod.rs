@@ -66,7 +66,7 @@ pub fn audit_together<'l>(
 /// The audit of a log by itself.
 fn of_log(log: &Log, columns: &Columns) -> Audit {
     let (mended, repeated) = log.without_repeats();
-    let read = Reading::of(mended);
+    let read = Reading::of(mended, columns);
     let (meant, misread) = misread::as_meant(&read, columns);
     let mut audit = measured(log, read.joints);
     let findings = match meant {

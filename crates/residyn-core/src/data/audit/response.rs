@@ -43,10 +43,15 @@ pub(super) fn response(regression: &Regression<'_>) -> Option<Response> {
 mod tests {
     use super::super::joint::audit_joints;
     use super::super::tests::swing;
+    use crate::data::Columns;
     use crate::data::log::Log;
 
     fn response(log: &Log) -> super::Response {
-        audit_joints(log).0.remove(0).response.unwrap()
+        audit_joints(log, &Columns::default())
+            .0
+            .remove(0)
+            .response
+            .unwrap()
     }
 
     #[test]

@@ -15,21 +15,21 @@ pub(super) fn report_rest(audits: &mut [Audit]) {
             .iter_mut()
             .filter(|audit| moves(audit) == Some(false));
         for audit in resting {
-            let range = audit.joints[joint].q.range();
-            audit.add(finding(joint, range, is_moved));
+            let q = &audit.joints[joint].q;
+            let text = format!("{} {}", short(q.range()), q.unit);
+            audit.add(finding(joint, &text, is_moved));
         }
     }
 }
 
-fn finding(joint: Joint, range: f64, is_moved_by_others: bool) -> Finding {
+fn finding(joint: Joint, range: &str, is_moved_by_others: bool) -> Finding {
     let (severity, therefore) = match is_moved_by_others {
         true => (Severity::Info, "its parameters come from the other logs"),
         false => (Severity::Serious, "its parameters cannot be identified"),
     };
     let text = format!(
-        "joint {joint} moves by {} rad, less than {VISIBLE_STEPS} resolution steps or standard deviations of the \
-         noise: {therefore}",
-        short(range)
+        "joint {joint} moves by {range}, less than {VISIBLE_STEPS} resolution steps or standard deviations of the \
+         noise: {therefore}"
     );
     Finding::new(severity, text).of(joint)
 }

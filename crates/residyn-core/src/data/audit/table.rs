@@ -4,7 +4,6 @@ use std::fmt;
 
 use super::channel::Channel;
 use super::quality::{Audit, Remedy, RemedyWords, Severity};
-use crate::data::column::Quantity;
 use crate::layout::{LABEL, hanging, wrap};
 
 /// Widest line \[characters\].
@@ -65,14 +64,10 @@ impl Audit {
             "\n{:<8}{:<6}{:>11}{:>11}{:>12}{:>12}{:>9}{:>10}",
             "channel", "unit", "min", "max", "resolution", "noise", "spikes", "at limit"
         )?;
-        let driven_in = match self.driven_by {
-            Quantity::Torque => "N m",
-            _ => "",
-        };
         for joint in &self.joints {
-            write_channel(f, &joint.q, "rad")?;
-            write_channel(f, &joint.qd, "rad/s")?;
-            write_channel(f, &joint.tau, driven_in)?;
+            write_channel(f, &joint.q)?;
+            write_channel(f, &joint.qd)?;
+            write_channel(f, &joint.tau)?;
         }
         Ok(())
     }
@@ -81,7 +76,13 @@ impl Audit {
         writeln!(
             f,
             "\n{:<6}{:>11}{:>9}{:>11}{:>10}{:>10}{:>10}  tau lag",
-            "joint", "fast rad/s", "at rest", "reversals", "full turn", "qd scale", "qd lag ms"
+            "joint",
+            self.fast(),
+            "at rest",
+            "reversals",
+            "full turn",
+            "qd scale",
+            "qd lag ms"
         )?;
         for joint in &self.joints {
             let or_dash = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), short);
@@ -101,6 +102,16 @@ impl Audit {
             )?;
         }
         Ok(())
+    }
+
+    /// The head of the joints' speeds.
+    fn fast(&self) -> &'static str {
+        let sliding = self.joints.iter().filter(|joint| joint.slides()).count();
+        match sliding {
+            0 => "fast rad/s",
+            all if all == self.joints.len() => "fast m/s",
+            _ => "fast",
+        }
     }
 
     fn write_findings(&self, f: &mut fmt::Formatter<'_>, words: RemedyWords<'_>) -> fmt::Result {
@@ -126,12 +137,12 @@ impl Audit {
     }
 }
 
-fn write_channel(f: &mut fmt::Formatter<'_>, channel: &Channel, unit: &str) -> fmt::Result {
+fn write_channel(f: &mut fmt::Formatter<'_>, channel: &Channel) -> fmt::Result {
     writeln!(
         f,
         "{:<8}{:<6}{:>11}{:>11}{:>12}{:>12}{:>9}{:>10}",
         channel.name,
-        unit,
+        channel.unit,
         short(channel.min),
         short(channel.max),
         short(channel.resolution),

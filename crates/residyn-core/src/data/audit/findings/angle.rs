@@ -98,12 +98,13 @@ pub(super) fn jumps(joint: &JointAudit, seen: &Seen<'_>) -> Option<Finding> {
     bridge(&log.time, &mut without, rows);
     let sizes = rows.iter().map(|&row| (angles[row] - without[row]).abs());
     let text = format!(
-        "{} jumps in {} single row(s) ({}), by up to {} rad, first at t = {} s: masked in fits, counted in errors on \
+        "{} jumps in {} single row(s) ({}), by up to {} {}, first at t = {} s: masked in fits, counted in errors on \
          test logs; check the encoder's wiring",
         joint.q.name,
         rows.len(),
         percent(rows.len() as f64 / log.rows() as f64),
         short(sizes.fold(0.0, f64::max)),
+        joint.q.unit,
         short(log.time[first])
     );
     let severity = spike_severity(rows.len(), log.rows()).min(Warning);

@@ -1,7 +1,7 @@
 //! Checks of what drives a joint: its torque, or the command of its drive.
 
 use super::Severity::{Info, Serious, Warning};
-use super::{Finding, JointAudit, Seen, is_passive, percent, short, spike_severity};
+use super::{Finding, JointAudit, Seen, is_passive, milliseconds, percent, short, spike_severity};
 
 /// Less clipping than this leaves the torque usable as logged.
 const MUCH_SATURATION: f64 = 0.02;
@@ -30,7 +30,8 @@ pub(super) fn constant_command(joint: &JointAudit, _: &Seen<'_>) -> Option<Findi
 }
 
 pub(super) fn constant_torque(joint: &JointAudit, _: &Seen<'_>) -> Option<Finding> {
-    let (number, name, nm) = (joint.joint, &joint.tau.name, short(joint.tau.max));
+    let (number, name) = (joint.joint, &joint.tau.name);
+    let (value, unit) = (short(joint.tau.max), joint.tau.unit);
     Some(match is_passive(joint) {
         true => Finding::new(
             Info,
@@ -39,7 +40,7 @@ pub(super) fn constant_torque(joint: &JointAudit, _: &Seen<'_>) -> Option<Findin
         false => Finding::new(
             Warning,
             format!(
-                "{name} is {nm} N m throughout: its gain cannot be distinguished from a constant torque; vary the \
+                "{name} is {value} {unit} throughout: its gain cannot be distinguished from a constant torque; vary the \
                  torque"
             ),
         ),
@@ -49,11 +50,12 @@ pub(super) fn constant_torque(joint: &JointAudit, _: &Seen<'_>) -> Option<Findin
 pub(super) fn one_sided(joint: &JointAudit, _: &Seen<'_>) -> Option<Finding> {
     let tau = &joint.tau;
     let text = format!(
-        "{} never changes sign ({} to {} N m): its gain is hard to distinguish from a constant torque; drive in both \
+        "{} never changes sign ({} to {} {}): its gain is hard to distinguish from a constant torque; drive in both \
          directions",
         tau.name,
         short(tau.min),
-        short(tau.max)
+        short(tau.max),
+        tau.unit
     );
     (tau.min >= 0.0 || tau.max <= 0.0).then(|| Finding::new(Warning, text))
 }
@@ -64,11 +66,12 @@ pub(super) fn saturated(joint: &JointAudit, seen: &Seen<'_>) -> Option<Finding> 
         return None;
     }
     let text = format!(
-        "{} sits at an end of its range ({} to {} N m) in {} of the rows: make sure that the column holds the torque \
+        "{} sits at an end of its range ({} to {} {}) in {} of the rows: make sure that the column holds the torque \
          after limiting",
         tau.name,
         short(tau.min),
         short(tau.max),
+        tau.unit,
         percent(tau.saturated_fraction)
     );
     let at_limit = (0..values.len()).filter(|row| tau.limits.contains(&values[*row]));
@@ -95,9 +98,10 @@ pub(super) fn chatter(joint: &JointAudit, _: &Seen<'_>) -> Option<Finding> {
     if ratio < SOME_CHATTER {
         return None;
     }
+    let unit = tau.unit;
     let far_off = match demand.far_off > 0.0 {
         true => format!(
-            "; {} of the rows, up to {} N m, exceed twice the {} N m that the motion needs at most",
+            "; {} of the rows, up to {} {unit}, exceed twice the {} {unit} that the motion needs at most",
             percent(demand.far_off),
             short(tau.max.max(-tau.min)),
             short(demand.needed_nm)
@@ -105,7 +109,7 @@ pub(super) fn chatter(joint: &JointAudit, _: &Seen<'_>) -> Option<Finding> {
         false => String::new(),
     };
     let text = format!(
-        "{} chatters: {} N m (root mean square) above {} Hz against {} N m below, {} times as much{far_off}. Hardly any \
+        "{} chatters: {} {unit} (root mean square) above {} Hz against {} {unit} below, {} times as much{far_off}. Hardly any \
          of it moves the joint, but all of it counts in a least-squares fit of the torque: record again with softer \
          gains or a smooth command",
         tau.name,
@@ -146,12 +150,13 @@ pub(super) fn unexplained(joint: &JointAudit, _: &Seen<'_>) -> Option<Finding> {
 
 pub(super) fn lag(joint: &JointAudit, seen: &Seen<'_>) -> Option<Finding> {
     let (found, step_s) = (joint.torque_lag?, seen.audit.median_step_s);
-    let (verb, late, steps) = super::lag(found.lag_s, step_s);
+    let steps = found.lag_s / step_s;
     let text = format!(
-        "the acceleration of joint {} {verb} {} by {late} ({} steps, correlation {}): a delay of the actuator or of the \
+        "the acceleration of joint {} trails {} by {} ({} steps, correlation {}): a delay of the actuator or of the \
          time stamps; shift the column by this much before you compute inertias row by row",
         joint.joint,
         joint.tau.name,
+        milliseconds(found.lag_s),
         short(steps),
         short(found.correlation)
     );
@@ -160,5 +165,5 @@ pub(super) fn lag(joint: &JointAudit, seen: &Seen<'_>) -> Option<Finding> {
     } else {
         Info
     };
-    (found.lag_s.abs() >= LAG_STEPS * step_s).then(|| Finding::new(severity, text))
+    (steps >= LAG_STEPS).then(|| Finding::new(severity, text))
 }

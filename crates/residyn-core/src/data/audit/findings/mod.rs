@@ -35,6 +35,7 @@ enum Of {
     ConstantTorque,
     Torque,
     Motion,
+    Velocity,
 }
 
 /// The checks of a log as a whole.
@@ -63,9 +64,9 @@ static JOINT_CHECKS: [(Of, JointCheck); 16] = [
     (Of::Motion, angle::repeats),
     (Of::Motion, angle::freezes),
     (Of::Motion, angle::jumps),
-    (Of::Motion, velocity::scale),
-    (Of::Motion, velocity::lag),
-    (Of::Motion, velocity::spikes),
+    (Of::Velocity, velocity::scale),
+    (Of::Velocity, velocity::lag),
+    (Of::Velocity, velocity::spikes),
 ];
 
 /// All findings about a log, in the order of the joints.
@@ -90,6 +91,7 @@ impl Seen<'_> {
             Of::ConstantTorque => is_torque && joint.tau.constant && !self.is_passive(),
             Of::Torque => is_torque && !joint.tau.constant,
             Of::Motion => joint.moves(),
+            Of::Velocity => joint.moves() && !self.log.is_qd_derived,
         }
     }
 
@@ -111,12 +113,6 @@ fn milliseconds(time_s: f64) -> String {
     format!("{} ms", short(1e3 * time_s))
 }
 
-/// A lag by its verb, its size and its steps.
-fn lag(lag_s: f64, step_s: f64) -> (&'static str, String, f64) {
-    let verb = if lag_s > 0.0 { "trails" } else { "leads" };
-    (verb, milliseconds(lag_s.abs()), lag_s.abs() / step_s)
-}
-
 /// How much a number of bad rows matters.
 fn spike_severity(spikes: usize, rows: usize) -> Severity {
     match spikes as f64 / rows as f64 {
@@ -130,6 +126,7 @@ fn spike_severity(spikes: usize, rows: usize) -> Severity {
 mod tests {
     use super::super::tests::{audit, each, edited, one_joint, swing, uniform};
     use super::*;
+    use crate::data::Columns;
 
     type Change = fn(&mut Log);
 
@@ -328,6 +325,77 @@ mod tests {
         };
         assert!(!says(reversed_command, "opposite sign"));
         assert!(!says(jump, "Serious"), "a jump spoils no other finding");
+    }
+
+    #[test]
+    fn a_velocity_beside_its_angle_is_said_in_steps() {
+        let backward: Change = |log| log.qd[0] = differences(log, 1);
+        assert!(says(
+            backward,
+            "Info: qd1 trails dq1/dt by ... ms, half a step, as a backward difference of q1 does; do not"
+        ));
+        let forward: Change = |log| log.qd[0] = differences(log, 0);
+        assert!(says(
+            forward,
+            "Info: qd1 leads dq1/dt by ... ms, half a step, as a forward difference of q1 does; do not"
+        ));
+        let filtered: Change = |log| log.qd[0].rotate_right(4);
+        assert!(says(
+            filtered,
+            "Warning: qd1 trails dq1/dt by ... steps: a filter, or another clock; do not"
+        ));
+        let ahead: Change = |log| log.qd[0].rotate_left(4);
+        assert!(says(
+            ahead,
+            "Warning: qd1 leads dq1/dt by ... steps: a filter, or another clock; do not"
+        ));
+        let derived: Change = |log| {
+            log.qd[0].rotate_right(4);
+            log.is_qd_derived = true;
+        };
+        assert!(!says(derived, "qd1 trails"), "no column holds it");
+    }
+
+    /// Differences of the angle to the row before (1) or to the next one (0), rad/s.
+    fn differences(log: &Log, before: usize) -> Vec<f64> {
+        let q = &log.q[0];
+        let ends = |row: usize| {
+            [
+                row.saturating_sub(before),
+                (row + 1 - before).min(q.len() - 1),
+            ]
+        };
+        let slope = |row: usize| {
+            let [from, to] = ends(row);
+            (q[to] - q[from]) / 0.002
+        };
+        (0..q.len()).map(slope).collect()
+    }
+
+    #[test]
+    fn a_joint_that_slides_has_its_own_units() {
+        let slide = Columns {
+            slides: vec![true],
+            ..Columns::default()
+        };
+        let log = edited(|log| {
+            clip(log);
+            jump(log);
+            log.qd[0].fill(0.0);
+        });
+        let sliding = super::super::audit(&log, &slide).to_string();
+        for unit in ["50 m,", "N) in", "0 m/s throughout", "fast m/s"] {
+            assert!(sliding.contains(unit), "{unit} in {sliding}");
+        }
+        assert!(
+            !sliding.contains("rad") && !sliding.contains("N m"),
+            "{sliding}"
+        );
+        let turning = audit(&log).to_string();
+        assert!(
+            turning.contains("50 rad,") && turning.contains("N m) in"),
+            "{turning}"
+        );
     }
 
     #[test]

@@ -21,7 +21,7 @@ const DEGREE: f64 = TAU / 360.0;
 
 pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
     // A motion of fewer degrees than a turn has radians is too small to distinguish the two.
-    let is_far = |joint: &&JointAudit| joint.moves() && joint.q.range() > TAU;
+    let is_far = |joint: &&JointAudit| joint.moves() && !joint.slides() && joint.q.range() > TAU;
     let mut far = reading.joints.iter().filter(is_far).peekable();
     if far.peek().is_none() {
         return vec![];

@@ -76,7 +76,7 @@ pub(super) fn as_meant<'l>(
         let mut log = (*reading.log).clone();
         let changes = misread.iter().flat_map(|one| &one.changes);
         changes.for_each(|change| change.apply(&mut log));
-        meant = Some(Reading::of(Cow::Owned(log)));
+        meant = Some(Reading::of(Cow::Owned(log), columns));
         found.extend(misread);
     }
     let findings = with_remedies(&found, columns, read.log.joints());
@@ -106,8 +106,8 @@ pub fn reversed_driving(
 }
 
 impl<'l> Reading<'l> {
-    pub fn of(log: Cow<'l, Log>) -> Self {
-        let (joints, motions) = audit_joints(&log);
+    pub fn of(log: Cow<'l, Log>, columns: &Columns) -> Self {
+        let (joints, motions) = audit_joints(&log, columns);
         Self {
             log,
             joints,
@@ -169,6 +169,7 @@ impl Change {
     fn apply(&self, log: &mut Log) {
         if matches!(self.to, To::Derived) {
             log.qd = log.q.iter().map(|q| slopes(&log.time, q)).collect();
+            log.is_qd_derived = true;
             return;
         }
         let values = &mut log.of_mut(self.quantity)[self.place()];

@@ -37,7 +37,8 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
             changes: unit.into_iter().chain([change(To::Wrapped)]).collect(),
         })
     };
-    Joint::all(log.joints()).filter_map(of_joint).collect()
+    let turning = reading.joints.iter().filter(|joint| !joint.slides());
+    turning.filter_map(|joint| of_joint(joint.joint)).collect()
 }
 
 /// The rows after which an angle passes the end of a turn of this length; `None` if it never does, or does not stay

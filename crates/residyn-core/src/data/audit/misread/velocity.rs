@@ -28,6 +28,9 @@ const RATIOS: [(f64, Quantity, &str); 4] = [
 ];
 
 pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
+    if reading.log.is_qd_derived {
+        return vec![];
+    }
     let moving = reading.joints.iter().filter(|joint| joint.moves());
     moving.filter_map(of_joint).collect()
 }
@@ -46,8 +49,9 @@ fn wrong(audit: &JointAudit) -> Option<(String, Quantity, To)> {
     };
     if audit.qd.constant {
         return derived(format!(
-            "{qd} is {} rad/s throughout while {q} moves",
-            short(audit.qd.max)
+            "{qd} is {} {} throughout while {q} moves",
+            short(audit.qd.max),
+            audit.qd.unit
         ));
     }
     let check = audit.velocity?;
@@ -67,7 +71,9 @@ fn wrong(audit: &JointAudit) -> Option<(String, Quantity, To)> {
         return None;
     }
     let text = format!("{qd} is {} times d{q}/dt", short(check.scale));
-    let fits = |(size, ..): &&(f64, Quantity, &str)| (check.scale / size - 1.0).abs() < SAME;
+    let fits = |(size, ..): &&(f64, Quantity, &str)| {
+        !audit.slides() && (check.scale / size - 1.0).abs() < SAME
+    };
     let Some(&(_, quantity, unit)) = RATIOS.iter().find(fits) else {
         return derived(format!("{text}, an unknown unit or gear ratio"));
     };
