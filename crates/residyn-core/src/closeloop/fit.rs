@@ -91,6 +91,7 @@ impl<'a> Problem<'a> {
         let (fitted, identifiability) = found;
         let problem = Self {
             moved_to,
+            usual: Arc::default(),
             ..problem.knowing(identifiability)
         };
         Ok(Declared { problem, fitted })
@@ -198,8 +199,11 @@ impl<'a> Problem<'a> {
     /// The declared model with baseline friction on every joint, fitted from the starting values of the declared one;
     /// `None` if it diverges.
     pub(super) fn with_usual_friction(&self) -> Option<Fitted> {
-        let friction = baseline_friction(self);
-        self.fitted_beside(&self.started_from(), &friction).ok()
+        let fit = || {
+            let friction = baseline_friction(self);
+            self.fitted_beside(&self.started_from(), &friction).ok()
+        };
+        self.usual.get_or_init(fit).clone()
     }
 
     /// The declared model with these effects, fitted from these values: over short windows, then over the problem's
