@@ -1,5 +1,7 @@
 //! Choice of the error model: which errors say more about the logs.
 
+use std::sync::Arc;
+
 use super::fit::NOTHING;
 use super::problem::Problem;
 use super::select::{baseline_friction, usual_forces};
@@ -38,6 +40,7 @@ impl Problem<'_> {
         let by_motion = Problem {
             declared: &model,
             library: &NOTHING,
+            usual: Arc::default(),
             ..self.clone()
         };
         let by_motion = by_motion.fit_declared().ok()?;

@@ -94,6 +94,7 @@ impl<'a> Problem<'a> {
         let (fitted, identifiability) = found;
         let problem = Self {
             moved_to,
+            usual: Arc::default(),
             ..problem.knowing(identifiability)
         };
         Ok(Declared { problem, fitted })
@@ -119,6 +120,7 @@ impl<'a> Problem<'a> {
         let first = is_motion.then(|| self.best_beside(start, &forces).ok());
         Self {
             first: first.flatten().map(Arc::new),
+            usual: Arc::default(),
             ..self.clone()
         }
     }
@@ -202,6 +204,12 @@ impl<'a> Problem<'a> {
     /// The declared model with baseline friction on every joint, fitted from the first optimum or, without one, from the
     /// starting values of the declared model; `None` if it diverges.
     pub(super) fn with_usual_friction(&self) -> Option<Fitted> {
+        self.usual
+            .get_or_init(|| self.fitted_with_usual_friction())
+            .clone()
+    }
+
+    fn fitted_with_usual_friction(&self) -> Option<Fitted> {
         let friction = self.at_first_optimum(baseline_friction(self));
         match &self.first {
             Some(first) => {

@@ -42,6 +42,9 @@ pub struct Problem<'a> {
     /// The first optimum: the declared model with the friction and a constant torque of every joint. On a rig that has
     /// them, the optimum of a model without them may lie anywhere.
     pub first: Option<Arc<Fitted>>,
+    /// The declared model with the usual friction, fitted on first use, see [`Problem::with_usual_friction`]; unknown again
+    /// in every copy that would fit it differently.
+    pub(super) usual: Arc<OnceLock<Option<Fitted>>>,
     /// The free declared parameters at the starting values of their fit, if the model diverges at the values in its
     /// file; else empty.
     pub moved_to: Vec<Parameter>,
@@ -141,6 +144,7 @@ impl<'a> Problem<'a> {
             top_torque,
             top_driving,
             first: None,
+            usual: Arc::default(),
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
             held: Vec::new(),
@@ -198,6 +202,7 @@ impl<'a> Problem<'a> {
             sample: Sample::of(&shooting, self.settings.fit.sample_windows),
             shooting,
             first: None,
+            usual: Arc::default(),
             ..self.clone()
         }
     }
@@ -216,6 +221,7 @@ impl<'a> Problem<'a> {
         Self {
             smoothing_velocities,
             first: None,
+            usual: Arc::default(),
             ..self.clone()
         }
     }

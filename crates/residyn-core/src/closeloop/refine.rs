@@ -1,5 +1,7 @@
 //! Stage 7: estimate the declared and the chosen model in fine steps.
 
+use std::sync::Arc;
+
 use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::judge::Found;
@@ -99,6 +101,7 @@ impl<'a> Problem<'a> {
         Self {
             smoothing_velocities,
             held: self.identifiability.hold.clone(),
+            usual: Arc::default(),
             shooting: self
                 .shooting
                 .clone()

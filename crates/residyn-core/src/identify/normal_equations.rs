@@ -174,8 +174,12 @@ pub(super) fn solve_part(
 
 /// The part of a matrix in these rows and columns.
 pub fn submatrix(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
-    let at = |i: usize, j: usize| matrix[(rows[i], columns[j])];
-    DMatrix::from_fn(rows.len(), columns.len(), at)
+    let mut part = Vec::with_capacity(rows.len() * columns.len());
+    for &column in columns {
+        let values = &matrix.as_slice()[matrix.nrows() * column..][..matrix.nrows()];
+        part.extend(rows.iter().map(|&row| values[row]));
+    }
+    DMatrix::from_vec(rows.len(), columns.len(), part)
 }
 
 /// A matrix in units in which its diagonal is one, and the size of each unit; a diagonal that is not positive stays.
