@@ -134,6 +134,10 @@ impl Chosen {
     fn ask_logs_apart(&mut self, problem: &Problem<'_>, apart: &[Log]) {
         let with = SetApart::of(problem, &self.after, apart);
         demote(&mut self.standings, |standing| {
+            // The zeros of sensors are unknown there.
+            if standing.effect.effect.is_of_sensor() {
+                return None;
+            }
             let without = standing.without.as_ref().ok()?;
             let without = SetApart::of(problem, without, apart);
             let log = with.worse_than(&without, &problem.settings.select)?;

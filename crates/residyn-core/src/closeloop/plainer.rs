@@ -8,7 +8,6 @@ use super::fitted::Fitted;
 use super::problem::Problem;
 use crate::data::Log;
 use crate::identify::Values;
-use crate::model::Status;
 use crate::sim::metric::{errors_in, windows};
 
 /// Most groups of logs that are left out in turn.
@@ -47,7 +46,10 @@ pub(super) fn plainer(
     };
     let others = (usual.iter()).map(|usual| whole(usual, "of the model with the usual friction"));
     let others = others.chain([whole(declared, "of the declared model")]);
-    let without = chosen.standings.iter().filter_map(|standing| {
+    // The zeros of sensors are unknown in logs that a fit has not seen.
+    let of_rig =
+        (chosen.standings.iter()).filter(|standing| !standing.effect.effect.is_of_sensor());
+    let without = of_rig.filter_map(|standing| {
         let without = standing.without.as_ref().ok()?;
         // Most effects help on the logs set apart, which takes no refit to see.
         let less = error_apart(problem, without, apart);
@@ -55,10 +57,10 @@ pub(super) fn plainer(
             fitted: without,
             unused: format!("{} is", standing.effect.label()),
             of: "without it",
-            // An effect that is not established has to help.
-            least: match standing.status {
-                Status::Established => settings.plainer_gain,
-                Status::Supported => 0.0,
+            // An effect that does not help on left-out blocks either has nothing for it.
+            least: match standing.gain > 0.0 {
+                true => settings.plainer_gain,
+                false => 0.0,
             },
         };
         (less <= least.apart).then(other)
