@@ -3,6 +3,9 @@ use nalgebra::{DMatrix, DVector};
 use crate::closeloop::problem::Problem;
 use crate::identify::{Fit, WindowTerms, blocks, count, with_unit_diagonal};
 
+/// Half of the logs is left out from this many logs on: a single log seldom holds the motion that tells effects apart.
+const HALVED_LOGS: usize = 4;
+
 /// A problem's windows in blocks, for each of which a loss is given, and in groups, which are left out of a fit
 /// together.
 pub struct Folds {
@@ -49,11 +52,11 @@ impl Folds {
         self
     }
 
-    /// These blocks in two groups: every other log, or the odd and the even blocks of a single log.
+    /// These blocks in two groups: every other log or, of few logs, the odd and the even blocks.
     pub fn in_halves(mut self) -> Self {
-        let half = |(block, log): (usize, &usize)| match self.logs {
-            1 => block % 2,
-            _ => log % 2,
+        let half = |(block, log): (usize, &usize)| match self.logs < HALVED_LOGS {
+            true => block % 2,
+            false => log % 2,
         };
         self.groups = self.log_of.iter().enumerate().map(half).collect();
         self

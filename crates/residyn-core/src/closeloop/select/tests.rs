@@ -28,15 +28,16 @@ fn what_is_left_out_together_is_a_connected_part_of_one_log() {
 }
 
 #[test]
-fn halves_are_whole_logs() {
+fn halves_of_many_logs_are_whole_logs() {
     let study = Study::of_friction();
-    let problem = study.problem();
+    let logs = [study.logs.as_slice(), &study.logs].concat();
+    let problem = study.problem().on(&logs);
     let halves = Folds::of(&problem).in_halves();
     for (block, window) in halves.blocks.iter().zip(&problem.shooting.windows) {
         assert_eq!(halves.groups[*block], window.log % 2);
     }
-    let single = problem.on(&study.logs[..1]);
-    let halves = Folds::of(&single).in_halves();
+    let few = problem.on(&study.logs);
+    let halves = Folds::of(&few).in_halves();
     assert_eq!(halves.groups[..4], [0, 1, 0, 1]);
 }
 
