@@ -1,23 +1,20 @@
 //! Stage 3: fit the declared model.
 
 use std::collections::BTreeSet;
-use std::iter;
 use std::sync::{Arc, LazyLock};
-
-use rayon::prelude::*;
 
 use super::error::StudyError;
 use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::prepare::Prepared;
-use super::problem::{Problem, Sample};
+use super::problem::Problem;
 use super::select::{baseline_friction, usual_forces};
 use super::smoothing::width;
 use super::stage::{Stage, Watch};
-use super::start::{around, spread};
+use super::start::around;
 use crate::identify::{
-    Fit, FitError, Identifiability, Open, Shooting, Values, as_it_stands, cut, fit_by, fit_roughly,
-    fit_torques, identifiability, longest_stable_step, open, uncertainty,
+    FitError, Identifiability, Open, Shooting, Values, cut, fit_by, fit_roughly, fit_torques,
+    identifiability, longest_stable_step, open, uncertainty,
 };
 use crate::model::{FittedEffect, Library, Model};
 
@@ -117,7 +114,7 @@ impl<'a> Problem<'a> {
     fn near_first_optimum(&self, start: &Model) -> Self {
         let forces = usual_forces(self);
         let is_motion = self.error_model == ErrorModel::OutputError && !forces.is_empty();
-        let first = is_motion.then(|| self.best_beside(start, &forces).ok());
+        let first = is_motion.then(|| self.fitted_beside(start, &forces).ok());
         Self {
             first: first.flatten().map(Arc::new),
             usual: Arc::default(),
@@ -184,10 +181,9 @@ impl<'a> Problem<'a> {
         Some((start, found))
     }
 
-    /// The declared model, fitted from values at which it does not diverge and from a first optimum.
+    /// The declared model, fitted from these values and from a first optimum.
     fn fitted_from(&self, start: &Model, first: Option<&Fitted>) -> Result<ByMotion, FitError> {
-        self.evaluated_over(&self.windows_of(self.settings.fit.short_window_s), start)?;
-        let alone = self.best_beside(start, &[]).map(|alone| {
+        let alone = self.fitted_beside(start, &[]).map(|alone| {
             let identifiability = self.identifiability_of(&alone);
             (alone, identifiability)
         });
@@ -201,24 +197,14 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The declared model with baseline friction on every joint, fitted from the first optimum or, without one, from the
-    /// starting values of the declared model; `None` if it diverges.
+    /// The declared model with baseline friction on every joint, fitted from the starting values of the declared one;
+    /// `None` if it diverges.
     pub(super) fn with_usual_friction(&self) -> Option<Fitted> {
-        self.usual
-            .get_or_init(|| self.fitted_with_usual_friction())
-            .clone()
-    }
-
-    fn fitted_with_usual_friction(&self) -> Option<Fitted> {
-        let friction = self.at_first_optimum(baseline_friction(self));
-        match &self.first {
-            Some(first) => {
-                let own = &first.model.effects[..self.declared.effects.len()];
-                let model = first.model.with_effects([own, &friction].concat());
-                self.fitted_over(&self.shooting, &model).ok()
-            }
-            None => self.fitted_beside(&self.started_from(), &friction).ok(),
-        }
+        let fit = || {
+            let friction = baseline_friction(self);
+            self.fitted_beside(&self.started_from(), &friction).ok()
+        };
+        self.usual.get_or_init(fit).clone()
     }
 
     /// The declared model with these effects, fitted from these values: over short windows, then over the problem's
@@ -242,27 +228,6 @@ impl<'a> Problem<'a> {
         Ok((alone, self.identifiability_of(first)))
     }
 
-    /// The declared model with these effects, fitted from the best of a few starts: these values and others around
-    /// them, compared on a few windows. A single start may end in a basin that another set of values would not.
-    fn best_beside(&self, start: &Model, effects: &[FittedEffect]) -> Result<Fitted, FitError> {
-        let settings = &self.settings.fit;
-        let short = self.windows_of(settings.short_window_s);
-        let short = Sample::of(&short, settings.sample_windows).shooting;
-        let own = &self.declared.effects;
-        let from = |start: &Model| {
-            let model = start.with_effects([own.as_slice(), effects].concat());
-            let near = self.fitted_roughly(&short, &model)?;
-            self.fitted_roughly(&self.sample.shooting, &near.model)
-        };
-        let others = spread(start, settings.first_starts, settings.farthest_start);
-        let starts: Vec<Model> = iter::once(start.clone()).chain(others).collect();
-        let found: Vec<Result<Fitted, FitError>> = starts.par_iter().map(from).collect();
-        let loss =
-            |found: &Result<Fitted, FitError>| found.as_ref().map_or(f64::INFINITY, Fitted::loss);
-        let best = found.into_iter().min_by(|a, b| loss(a).total_cmp(&loss(b)));
-        self.fitted_over(&self.shooting, &best.expect("the first start")?.model)
-    }
-
     /// The declared model, fitted over short windows only, in which even a poor start does not diverge, from the
     /// starting values of its fit.
     ///
@@ -280,12 +245,6 @@ impl<'a> Problem<'a> {
             let start_states = shooting.initial_start_states(0);
             fit_by(self.solver, shooting, dynamics, active, start_states, None)
         })
-    }
-
-    fn evaluated_over(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fit, FitError> {
-        let dynamics = self.compiled(model);
-        let start_states = shooting.initial_start_states(0);
-        as_it_stands(shooting, &dynamics, &[], start_states, 1.0)
     }
 
     fn fitted_roughly(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fitted, FitError> {

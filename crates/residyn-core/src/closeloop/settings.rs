@@ -139,9 +139,6 @@ settings! {
         /// A joint is at rest in a window if it moves less than this share of its farthest travel in any window (as
         /// squares): errors relative to no travel are meaningless.
         at_rest_share: f64 = 1e-2,
-        /// The first optimum is looked for from the values in the file and from this many others around them, up to
-        /// `farthest_start`, on a few windows.
-        first_starts: u32 = 4,
         /// If a model diverges with the starting values in its file, up to this many others are tried before it is
         /// reported that none works.
         most_starts: u32 = 512,

@@ -1,6 +1,7 @@
 //! Starting values for a model that diverges with the values in its file.
 
 use super::problem::{Problem, Sample};
+use super::settings::FitSettings;
 use crate::identify::Values;
 use crate::model::{Model, Parameter};
 
@@ -12,13 +13,7 @@ const BASES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47
 pub(super) fn around(problem: &Problem<'_>) -> impl Iterator<Item = Model> {
     let short = problem.windows_of(problem.settings.fit.short_window_s);
     let sample = Sample::of(&short, problem.settings.fit.sample_windows).shooting;
-    let settings = &problem.settings.fit;
-    let all = spread(
-        problem.declared,
-        settings.most_starts,
-        settings.farthest_start,
-    );
-    all.filter(move |model| {
+    spread(problem.declared, &problem.settings.fit).filter(move |model| {
         let dynamics = problem.compiled(model);
         let values = Values::of(&dynamics, problem.logs);
         let costs = sample.costs(&dynamics, &values, &sample.initial_start_states(0), 1.0);
@@ -26,14 +21,15 @@ pub(super) fn around(problem: &Problem<'_>) -> impl Iterator<Item = Model> {
     })
 }
 
-/// A model with its free parameters at `most` values ever farther from its own, up to a factor of `farthest` up or
-/// down: spread evenly in the logarithm (Halton 1960), each keeping its sign.
-pub(super) fn spread(declared: &Model, most: u32, farthest: f64) -> impl Iterator<Item = Model> {
+/// A model with its free parameters at values ever farther from its declared ones: spread evenly in the logarithm
+/// (Halton 1960), each keeping its sign.
+fn spread(declared: &Model, settings: &FitSettings) -> impl Iterator<Item = Model> {
+    let most = settings.most_starts;
     (1..=most).map(move |k| {
         let mut model = declared.clone();
         let free = model.parameters.iter_mut().filter(|p| !p.fixed);
         for (parameter, base) in free.zip(BASES.into_iter().cycle()) {
-            let reach = farthest.ln() * f64::from(k) / f64::from(most);
+            let reach = settings.farthest_start.ln() * f64::from(k) / f64::from(most);
             move_by(parameter, reach * (2.0 * radical_inverse(k, base) - 1.0));
         }
         model
@@ -63,7 +59,7 @@ fn radical_inverse(mut number: u32, base: u32) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{radical_inverse, spread};
+    use super::{FitSettings, radical_inverse, spread};
     use crate::closeloop::tests::pendulum;
     use crate::model::Model;
 
@@ -77,7 +73,7 @@ mod tests {
         declared.parameters[0].value = -15.0;
         let factors = |k: usize| -> Vec<f64> {
             let of = |model: Model| model.parameters[k].value;
-            spread(&declared, 512, 10.0)
+            spread(&declared, &FitSettings::default())
                 .map(|model| of(model) / declared.parameters[k].value)
                 .collect()
         };

@@ -170,27 +170,6 @@ fn an_effect_that_saves_little_is_not_established() {
     assert!(reason.contains("the loss on left-out blocks by"));
 }
 
-/// Far from the declared values, where a fit may not move at all.
-#[test]
-fn the_first_optimum_does_not_depend_on_the_start() {
-    let loss = |factor: f64| {
-        let mut study = Study::of_friction();
-        for parameter in &mut study.declared.parameters {
-            parameter.value *= factor;
-        }
-        let problem = study.problem().with_first_optimum();
-        problem.first.unwrap().loss()
-    };
-    let known = loss(1.0);
-    for factor in [0.2, 0.5, 2.0, 5.0] {
-        let found = loss(factor);
-        assert!(
-            (found / known - 1.0).abs() < 0.01,
-            "{factor}: {found}, not {known}"
-        );
-    }
-}
-
 #[test]
 fn a_log_set_apart_tells_which_model_is_worse() {
     let (study, test) = Study::of_friction().split();

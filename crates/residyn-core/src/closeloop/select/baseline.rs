@@ -5,10 +5,7 @@ use super::candidate::acting;
 
 impl Problem<'_> {
     /// These effects, each at its values in the first optimum, if it has it.
-    pub(in crate::closeloop) fn at_first_optimum(
-        &self,
-        effects: Vec<FittedEffect>,
-    ) -> Vec<FittedEffect> {
+    pub(super) fn at_first_optimum(&self, effects: Vec<FittedEffect>) -> Vec<FittedEffect> {
         let known = self.first.as_ref().map(|first| &first.model.effects);
         let found = |effect: FittedEffect| {
             let same = known.and_then(|known| known.iter().find(|known| known.is_same(&effect)));
