@@ -13,8 +13,8 @@ use super::smoothing::width;
 use super::stage::{Stage, Watch};
 use super::start::around;
 use crate::identify::{
-    FitError, Identifiability, Open, Shooting, Values, cut, fit_by, fit_roughly, fit_torques,
-    identifiability, longest_stable_step, open, uncertainty,
+    FitError, Identifiability, Open, Shooting, Values, cut, fit_by, fit_torques, identifiability,
+    longest_stable_step, open, uncertainty,
 };
 use crate::model::{FittedEffect, Library, Model};
 
@@ -217,8 +217,8 @@ impl<'a> Problem<'a> {
         let short = self.windows_of(self.settings.fit.short_window_s);
         let own = &self.declared.effects;
         let model = start.with_effects([own.as_slice(), effects].concat());
-        let near = self.fitted_roughly(&short, &model)?;
-        self.fitted_over(&self.shooting, &near.model)
+        let first = self.fitted_over(&short, &model)?;
+        self.fitted_over(&self.shooting, &first.model)
     }
 
     /// The declared model, fitted alone from the values of a first optimum, and what the logs determine of it there.
@@ -244,13 +244,6 @@ impl<'a> Problem<'a> {
         self.fitted_by(model, |dynamics, active| {
             let start_states = shooting.initial_start_states(0);
             fit_by(self.solver, shooting, dynamics, active, start_states, None)
-        })
-    }
-
-    fn fitted_roughly(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fitted, FitError> {
-        self.fitted_by(model, |dynamics, active| {
-            let start_states = shooting.initial_start_states(0);
-            fit_roughly(self.solver, shooting, dynamics, active, start_states)
         })
     }
 

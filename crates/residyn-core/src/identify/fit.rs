@@ -9,7 +9,7 @@ use crate::model::Dynamics;
 /// Damping of the step whose worth is predicted, as a share of the diagonal of the normal equations.
 const SCREENING_DAMPING: f64 = 1e-3;
 
-/// Most estimates of the scale; usually two or three suffice.
+/// Most estimates of the scale after the first fit; usually two or three suffice.
 const MOST_SCALES: usize = 8;
 
 /// Fit the parameters `active` of `dynamics` to the windows, starting from its values and `start_states`, with every window's
@@ -43,42 +43,16 @@ pub fn fit_by(
     scale: Option<f64>,
 ) -> Result<(Values, Fit), FitError> {
     let mut search = Search::new(shooting, dynamics, active, start_states, scale)?;
-    if scale.is_none() {
-        search = settled(solver, search).0.to(Purpose::Estimate);
-    }
-    let termination = solver.solve(&mut search);
-    Ok(search.finish(termination))
-}
-
-/// As [`fit_by`], only as closely as models are compared: to see where a start leads.
-///
-/// # Errors
-/// As [`fit`].
-pub fn fit_roughly(
-    solver: &dyn Solver,
-    shooting: &Shooting<'_>,
-    dynamics: &Dynamics,
-    active: &[usize],
-    start_states: Vec<Vec<f64>>,
-) -> Result<(Values, Fit), FitError> {
-    let search = Search::new(shooting, dynamics, active, start_states, None)?;
-    let (search, termination) = settled(solver, search);
-    Ok(search.finish(termination))
-}
-
-/// The search near its minimum at the scale of the residuals that it leaves there. While the scale changes, the minimum
-/// moves, and is found only as closely as models are compared. The smaller the scale is, the less the start states'
-/// estimates influence the residuals.
-fn settled<'a>(solver: &dyn Solver, search: Search<'a>) -> (Search<'a>, Termination) {
-    let mut search = search.to(Purpose::Compare);
     let mut termination = solver.solve(&mut search);
-    for _ in 1..MOST_SCALES {
-        if search.rescale() {
+    // The scale must be that of the final residuals; the smaller it is, the less the start states' estimates influence
+    // them.
+    for _ in 0..MOST_SCALES {
+        if scale.is_some() || search.rescale() {
             break;
         }
         termination = solver.solve(&mut search);
     }
-    (search, termination)
+    Ok(search.finish(termination))
 }
 
 /// As [`fit_by`] at a given scale, if only a cost below `below` is of use; `None` if the cost does not reach it.

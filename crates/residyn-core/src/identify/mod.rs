@@ -32,7 +32,7 @@ pub use crate::sim::{Window, cut, initial_state};
 pub use active_set::step_within_bounds;
 pub use combinations::{Combination, IdentifiableBodies, identifiable_bodies};
 pub use distance::squared_distance;
-pub use fit::{as_it_stands, fit, fit_below, fit_by, fit_roughly, predicted_cost};
+pub use fit::{as_it_stands, fit, fit_below, fit_by, predicted_cost};
 pub use identifiability::{Identifiability, Open, identifiability, open};
 pub(crate) use intervals::count;
 pub use intervals::{BLOCK_S, Uncertainty, blocks, blocks_of_times, uncertainty};
