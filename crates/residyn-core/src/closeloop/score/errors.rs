@@ -29,8 +29,8 @@ pub struct Errors {
     /// The same with each test log's sensor zeros estimated on its beginning, scored on the rest; if the model has
     /// zeros per log, and the logs are long enough.
     pub zeroed: Option<Assessment>,
-    /// The position error of all joints together at the middle horizon that the sensors' noise accounts for; see
-    /// [`noise_floor`].
+    /// The position error of all joints together at the middle horizon that the sensors' noise accounts for, in the rows
+    /// and in the start states of windows, rad (or m). `None` if torques are compared.
     pub noise_floor: Option<f64>,
     /// With the residual network.
     pub hybrid: Option<Assessment>,
