@@ -321,7 +321,7 @@ mod slow {
             "unit = \"N m/rad\", positive = true",
             "unit = \"N m/rad\", fixed = true",
         );
-        assert_eq!(known.matches("fixed = true").count(), 3, "{known}");
+        assert_eq!(known.matches("fixed = true").count(), 5, "{known}");
         scratch.file("arm.toml", known);
         let report = scratch.json(&format!("closeloop --model arm.toml {LOGS}"));
         assert_eq!(report["verdict"], "explained", "{report:#}");

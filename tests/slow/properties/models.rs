@@ -87,7 +87,10 @@ fn parameter() -> impl Strategy<Value = String> {
 fn column(quantity: Quantity, standard: String) -> BoxedStrategy<String> {
     let units: Vec<&str> = quantity.units().iter().map(|(unit, _)| *unit).collect();
     let unit = prop::option::of(prop::sample::select(units));
-    let name = prop_oneof![Just(standard), words()].boxed();
+    // Only what drives a joint may be missing.
+    let may_lack = matches!(quantity, Quantity::Torque | Quantity::Command);
+    let named = words().prop_filter("a name", move |name| may_lack || !name.is_empty());
+    let name = prop_oneof![Just(standard), named].boxed();
     let late = prop::option::of(-0.01..0.01_f64);
     let table = (name.clone(), unit, 1e-3..1e3_f64, any::<bool>(), late).prop_map(
         move |(name, unit, factor, flag, late)| {
