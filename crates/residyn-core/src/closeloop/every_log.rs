@@ -5,7 +5,7 @@ use super::establish::Standing;
 use super::fitted::Fitted;
 use super::problem::Problem;
 use super::select::is_worse;
-use super::settings::SelectSettings;
+use super::settings::Settings;
 use crate::data::Log;
 use crate::sim::metric::{errors_in, torque_error_with, windows};
 
@@ -73,9 +73,11 @@ impl SetApart {
     }
 
     /// The first log whose error exceeds another model's by more than chance and rounding.
-    pub fn worse_than(&self, other: &Self, settings: &SelectSettings) -> Option<usize> {
+    pub fn worse_than(&self, other: &Self, settings: &Settings) -> Option<usize> {
+        let chance = settings.establish.worse_standard_errors;
+        let rounding = settings.select.worse_share;
         let mut logs = self.squares.iter().zip(&other.squares);
-        logs.position(|(own, other)| is_worse(own, other, settings))
+        logs.position(|(own, other)| is_worse(own, other, chance, rounding))
     }
 }
 

@@ -140,7 +140,7 @@ impl Chosen {
             }
             let without = standing.without.as_ref().ok()?;
             let without = SetApart::of(problem, without, apart);
-            let log = with.worse_than(&without, &problem.settings.select)?;
+            let log = with.worse_than(&without, problem.settings)?;
             Some(format!("it raises the error on {}", apart[log].name()))
         });
     }

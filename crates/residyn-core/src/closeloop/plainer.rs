@@ -70,12 +70,7 @@ pub(super) fn plainer(
         let left = LeftOut::of(problem, other.fitted, apart);
         left.gain_over(&least, other.least)
     };
-    let mut gains: Vec<Option<f64>> = others.par_iter().map(gain).collect();
-    // A model that is worse than the declared one on the logs set apart is of no use, whatever the others say.
-    let of_declared = usual.iter().count();
-    let apart = LeftOut::apart(problem, declared, apart);
-    let gain = apart.gain_over(&least, settings.plainer_gain);
-    gains[of_declared] = gain.or(gains[of_declared]);
+    let gains: Vec<Option<f64>> = others.par_iter().map(gain).collect();
     let better = others.iter().zip(gains);
     let better = better.filter_map(|(other, gain)| Some((other, gain?)));
     let (best, gain) = better.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
@@ -120,14 +115,6 @@ impl LeftOut {
         Self {
             in_turn: in_turn.map(|squares| log_error(&squares)),
             apart,
-        }
-    }
-
-    /// On the logs set apart only.
-    fn apart(problem: &Problem<'_>, fitted: &Fitted, apart: &[Log]) -> Self {
-        Self {
-            in_turn: None,
-            apart: error_apart(problem, fitted, apart),
         }
     }
 

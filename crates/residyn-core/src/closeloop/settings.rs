@@ -247,6 +247,9 @@ settings! {
         /// An effect is confirmed if the fall of the loss on the half of the blocks that its size was not fitted to has
         /// at most this probability by chance.
         confirming_false_alarm: f64 = 0.1,
+        /// An effect is not established if it raises the open-loop error of a log set apart by more than this many
+        /// standard errors over the log's windows: with a few logs and effects, one raises it by one by chance.
+        worse_standard_errors: f64 = 2.0,
         /// If the effects leave more than this share of the loss and an unexplained residual stays, none is
         /// established: they would mask the real cause.
         masking_share: f64 = 0.5,

@@ -178,7 +178,7 @@ fn a_log_set_apart_tells_which_model_is_worse() {
     let effects = vec![absent("coulomb_friction")];
     let with = problem.with_effects(&without, effects).unwrap();
     let [with, without] = [with, without].map(|fitted| SetApart::of(&problem, &fitted, &test));
-    let settings = &study.settings.select;
+    let settings = &study.settings;
     assert_eq!(with.worse_than(&without, settings), None);
     assert_eq!(without.worse_than(&with, settings), Some(0));
     assert_eq!(with.worse_than(&with, settings), None);

@@ -29,16 +29,17 @@ impl OpenLoopCheck {
 
     /// Whether this error exceeds another by more than chance and rounding.
     pub fn is_worse_than(&self, other: &Self, settings: &SelectSettings) -> bool {
-        is_worse(&self.squares, &other.squares, settings)
+        let chance = settings.worse_standard_errors;
+        is_worse(&self.squares, &other.squares, chance, settings.worse_share)
     }
 }
 
-/// Whether sums of squares of errors exceed others by more than chance and rounding.
-pub fn is_worse(squares: &[f64], others: &[f64], settings: &SelectSettings) -> bool {
+/// Whether sums of squares of errors exceed others by more than `chance`, in standard errors, and by more than the share
+/// `rounding`.
+pub fn is_worse(squares: &[f64], others: &[f64], chance: f64, rounding: f64) -> bool {
     let rises = differences(squares, others);
     let rise = rises.iter().sum::<f64>() / others.iter().sum::<f64>();
-    mean(&rises) > settings.worse_standard_errors * standard_error(&rises)
-        && rise > settings.worse_share
+    mean(&rises) > chance * standard_error(&rises) && rise > rounding
 }
 
 /// Squares of the open-loop error in each block, with the values that a fit without the block's group gives.
