@@ -195,7 +195,7 @@ fn typical(
     let effect = library.effect(name).ok()?;
     problem.declared.can_carry(effect, like.joint).ok()?;
     let joint = like.joint;
-    let effect = effect.measured_by(problem.top_speed[joint], problem.top_torque[joint]);
+    let effect = problem.measured(effect, joint);
     let mut fitted = FittedEffect::absent(&effect, joint);
     for (slot, parameter) in fitted.values.iter_mut().zip(&effect.parameters) {
         slot.0 = parameter.typical;
@@ -210,7 +210,7 @@ fn fitted(problem: &Problem<'_>, library: &Library, hidden: &Hidden) -> Option<F
     }
     let joint = hidden.joint;
     let effect = library.effect(&hidden.name).ok()?;
-    let effect = effect.measured_by(problem.top_speed[joint], problem.top_torque[joint]);
+    let effect = problem.measured(effect, joint);
     let mut fitted = FittedEffect::absent(&effect, joint);
     for (slot, parameter) in fitted.values.iter_mut().zip(&effect.parameters) {
         slot.0 = match hidden.values.get(&parameter.name) {

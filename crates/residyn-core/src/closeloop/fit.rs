@@ -71,7 +71,7 @@ impl<'a> Problem<'a> {
     /// No window, or a model that diverges even over short windows, from all starting values.
     pub fn fit_declared(&self) -> Result<Declared<'a>, StudyError> {
         if self.error_model == ErrorModel::InverseDynamics {
-            return Ok(self.fitted_by_torques(&baseline_friction(self))?);
+            return Ok(self.fitted_by_torques(&usual_forces(self))?);
         }
         let problem = match self.first {
             Some(_) => self.clone(),

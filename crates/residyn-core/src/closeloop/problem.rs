@@ -6,7 +6,7 @@ use super::fitted::Fitted;
 use super::settings::Settings;
 use super::smoothing::width;
 use super::split::by_numbers;
-use crate::data::{Audit, JointAudit, Log, audit};
+use crate::data::{Audit, Joint, JointAudit, Log, audit};
 use crate::identify::{
     Fit, FitError, Identifiability, LevenbergMarquardt, Shooting, Solver, Values, cut, fit_below,
     fit_by, free_parameters,
@@ -168,6 +168,13 @@ impl<'a> Problem<'a> {
     /// A share of the loss of one part, as a share of the whole loss.
     pub(super) fn of_whole(&self, share: f64) -> f64 {
         share / self.parts() as f64
+    }
+
+    /// An effect with bounds and starting values in a joint's own units. Friction that reverses over a range of speeds
+    /// has no shape of its own within it.
+    pub fn measured(&self, effect: &Effect, joint: Joint) -> Effect {
+        let slowest = self.settings.fit.resolved_speed * self.smoothing_velocities[joint];
+        effect.measured_by(slowest, self.top_speed[joint], self.top_torque[joint])
     }
 
     /// The effects that the model may lack.

@@ -34,9 +34,7 @@ pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
                 && !is_of_too_many(problem, effect)
                 && problem.declared.can_carry(effect, joint).is_ok()
             {
-                let (speed, torque) = (problem.top_speed[joint], problem.top_torque[joint]);
-                let effect = effect.measured_by(speed, torque);
-                all.push(FittedEffect::absent(&effect, joint));
+                all.push(FittedEffect::absent(&problem.measured(effect, joint), joint));
             }
         }
     }
