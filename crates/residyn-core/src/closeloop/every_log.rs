@@ -74,11 +74,19 @@ impl SetApart {
 
     /// The first log whose error exceeds another model's by more than chance and rounding.
     pub fn worse_than(&self, other: &Self, settings: &Settings) -> Option<usize> {
-        let chance = settings.establish.worse_standard_errors;
-        let rounding = settings.select.worse_share;
         let mut logs = self.squares.iter().zip(&other.squares);
-        logs.position(|(own, other)| is_worse(own, other, chance, rounding))
+        logs.position(|(own, other)| exceeds(own, other, settings))
     }
+
+    /// Whether the error over all logs exceeds another model's by more than chance and rounding.
+    pub fn is_worse_than(&self, other: &Self, settings: &Settings) -> bool {
+        exceeds(&self.squares.concat(), &other.squares.concat(), settings)
+    }
+}
+
+fn exceeds(squares: &[f64], others: &[f64], settings: &Settings) -> bool {
+    let chance = settings.establish.worse_standard_errors;
+    is_worse(squares, others, chance, settings.select.worse_share)
 }
 
 fn errors(model: &Fitted, log: &Log, dry: &[bool]) -> Option<Vec<f64>> {

@@ -20,21 +20,31 @@ struct ExternalForce {
 }
 
 /// Report in the audits of the problem's logs where an external force acted, judged by the residual forces of a fitted
-/// model.
+/// model; returns what that means for the answer, as a sentence's part, if one acted.
 pub(super) fn report_external_forces(
     problem: &Problem<'_>,
     forces: &[ForceSample],
     audits: &mut [Audit],
-) {
+) -> Option<String> {
+    let mut found = Vec::new();
     let settings = &problem.settings.notes;
     let block_s = problem.settings.diagnostics.block_s;
     for joint in Joint::all(problem.declared.joints) {
         let unit = problem.declared.columns.unit(Quantity::Torque, joint);
         let least = settings.push_torque * problem.top_torque[joint];
         for push in pushes(forces, joint, (block_s, least), settings) {
-            audits[push.log].add(push.finding(&problem.logs[push.log].name(), unit));
+            let log = problem.logs[push.log].name();
+            found.push(format!("from {} in {log}", push.span()));
+            audits[push.log].add(push.finding(&log, unit));
         }
     }
+    let first = found.first()?;
+    Some(match found.len() {
+        1 => format!("something may have pushed the rig {first}: leave that out first"),
+        n => format!(
+            "something may have pushed the rig {n} times, once {first}: leave these times out first"
+        ),
+    })
 }
 
 /// The external forces of at least `least` on a joint, in blocks of `block_s`.
@@ -73,12 +83,17 @@ fn pushes(
 }
 
 impl ExternalForce {
-    fn finding(&self, log: &str, unit: &str) -> Finding {
+    /// When it acted, to a hundredth of a second.
+    fn span(&self) -> Interval {
         let rounded = |t: f64| (100.0 * t).round() / 100.0;
-        let span = Interval {
+        Interval {
             start_s: rounded(self.span.start_s),
             end_s: rounded(self.span.end_s),
-        };
+        }
+    }
+
+    fn finding(&self, log: &str, unit: &str) -> Finding {
+        let span = self.span();
         let text = format!(
             "from {span} the model follows joint {} only with an additional force of up to {:.3} {unit}, {:.0} times \
              what it needs elsewhere: did something push or touch the rig? If so, leave this interval out",

@@ -16,7 +16,7 @@ use super::problem::Problem;
 use super::refine::Refined;
 use super::select::p_value;
 use crate::data::Log;
-use crate::model::{FittedEffect, Model, Status};
+use crate::model::{Entry, FittedEffect, Model, Status};
 
 /// What the declared model lacks, judged by the logs.
 pub struct Found<'a> {
@@ -52,6 +52,7 @@ pub(super) fn judge<'a>(
         ErrorModel::OutputError => chosen.ask_logs_apart(&problem, apart),
         ErrorModel::InverseDynamics => {
             chosen.ask_every_log(problem.logs.iter().chain(apart));
+            chosen.ask_places(&problem, apart);
             if let Some((after, standing)) = problem.with_payload(&chosen.after) {
                 chosen.after = after;
                 chosen.standings.push(standing);
@@ -157,6 +158,30 @@ impl Chosen {
         });
     }
 
+    /// Forces that depend on the angle are not established if a fit to the logs set apart alone does not show them: over
+    /// the range of a few logs they follow whatever the model lacks.
+    fn ask_places(&mut self, problem: &Problem<'_>, apart: &[Log]) {
+        if apart.is_empty() || !self.named().any(depends_on_angle) {
+            return;
+        }
+        let problem = problem.on(apart);
+        let start_states = problem.shooting.initial_start_states(0);
+        let Ok(alone) = problem.refit(&self.after.model, start_states, None) else {
+            return;
+        };
+        let most = problem.settings.establish.uncorrected_false_alarm;
+        let first = problem.declared.effects.len();
+        let effects: Vec<FittedEffect> = self.after.model.effects[first..].to_vec();
+        demote(&mut self.standings, |standing| {
+            let place = effects
+                .iter()
+                .position(|own| own.is_same(&standing.effect))?;
+            let p = p_value(&problem, &alone, first + place)?;
+            (depends_on_angle(&standing.effect) && p > most)
+                .then(|| format!("a fit to the logs set apart alone does not show it (p = {p:.2})"))
+        });
+    }
+
     /// Effects are not established if nothing is left of their evidence in fine steps: what the coarser ones showed was
     /// their own error.
     pub(super) fn confirm(&mut self, refined: &mut Refined<'_>) {
@@ -165,19 +190,40 @@ impl Chosen {
             refined.problem.settings.establish.uncorrected_false_alarm,
         );
         let added = problem.added(&refined.after.model);
-        let p_values = added.map(|k| p_value(problem, &refined.after, k));
-        let p_values: Vec<Option<f64>> = p_values.collect();
-        for (standing, p) in self.standings.iter_mut().zip(p_values) {
-            if let Some(p) = p.filter(|p| *p > least && standing.status == Status::Established) {
+        let reason = |k: usize| match p_value(problem, &refined.after, k) {
+            Some(p) if p > least => Some(format!(
+                "in finer steps its value is not significant (p = {p:.2})"
+            )),
+            _ => holds_zero(&refined.after.model.effects[k])
+                .then(|| "the interval of its size holds zero".to_owned()),
+        };
+        let reasons: Vec<Option<String>> = added.map(reason).collect();
+        for (standing, reason) in self.standings.iter_mut().zip(reasons) {
+            if reason.is_some() && standing.status == Status::Established {
                 standing.status = Status::Supported;
-                standing.reason = Some(format!(
-                    "in finer steps its value is not significant (p = {p:.2})"
-                ));
+                standing.reason = reason;
             }
         }
         mark(&mut refined.after.model, &self.standings);
         mark(&mut self.after.model, &self.standings);
     }
+}
+
+fn depends_on_angle(effect: &FittedEffect) -> bool {
+    let Entry::Force(formula) = &effect.effect.entry else {
+        return false;
+    };
+    let names = formula.names();
+    names.contains(&"q") && !names.contains(&"qd")
+}
+
+/// Whether an effect may be absent: zero lies within the interval of each value that is zero without it.
+fn holds_zero(effect: &FittedEffect) -> bool {
+    let values = effect.effect.parameters.iter().zip(&effect.values);
+    let switches = values.filter(|(parameter, _)| parameter.is_switch());
+    let mut intervals = switches.map(|(_, (_, interval))| *interval).peekable();
+    intervals.peek().is_some()
+        && intervals.all(|interval| interval.is_some_and(|[low, high]| low <= 0.0 && high >= 0.0))
 }
 
 /// Record the status of each added effect in a model.

@@ -9,6 +9,7 @@ mod by_log;
 mod calibrate;
 mod diagnostics;
 mod discriminate;
+mod drive_gain;
 mod error;
 mod error_model;
 mod error_model_choice;

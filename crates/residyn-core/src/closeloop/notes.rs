@@ -1,6 +1,7 @@
 //! Findings about the logs that only fitted models reveal, added to the logs' audits.
 
 use super::diagnostics::residual_force;
+use super::drive_gain::report_drive_gain;
 use super::external_force::report_external_forces;
 use super::fitted::Fitted;
 use super::gravity::{report_gravity, shares_of_gravity};
@@ -8,28 +9,49 @@ use super::judge::Found;
 use super::outcome::Diagnostics;
 use super::prepare::Prepared;
 use super::problem::Problem;
+use super::refine::Refined;
 use super::select::is_of_too_many;
 use crate::data::{Audit, Finding, Repeated, Severity, report_repeats};
 
-/// The audits of the training logs, then of the test logs, with what the models show: torques that are reversed or hold
-/// another gravity, external forces, effects that are not looked for, and logs that repeat others; and the test logs
-/// that repeat training logs. `usual` is the declared model with the usual friction.
+/// What fitted models say of the logs.
+pub(super) struct Noted {
+    /// Of the training logs, then of the test logs: also torques that are reversed or hold another gravity, external
+    /// forces, effects that are not looked for, values that share a factor, and logs that repeat others.
+    pub audits: Vec<Audit>,
+    /// Test logs that repeat training logs.
+    pub fitted_tests: Vec<String>,
+    /// What external forces in the training logs mean for the answer.
+    pub pushed: Option<String>,
+}
+
+impl Noted {
+    /// The reason for a verdict, after what makes it doubtful.
+    pub fn before(&self, reason: String) -> String {
+        match &self.pushed {
+            Some(pushed) => format!("{pushed}; {reason}"),
+            None => reason,
+        }
+    }
+}
+
+/// What fitted models say of the logs. `usual` is the declared model with the usual friction.
 pub(super) fn noted(
     prepared: &Prepared<'_>,
-    found: &Found<'_>,
+    (found, refined): (&Found<'_>, &Refined<'_>),
     usual: Option<&Fitted>,
     diagnostics: &Diagnostics,
-) -> (Vec<Audit>, Vec<String>) {
+) -> Noted {
     let (problem, settings) = (&found.problem, &found.problem.settings.notes);
     let [mut of_train, mut of_test] =
         [&prepared.train, &prepared.test].map(|ready| ready.audits.clone());
     problem.report_reversed(usual, &mut of_train);
     report_gravity(&found.gravity, settings, &mut of_train);
     report_too_many(problem, &mut of_train);
+    report_drive_gain(problem.declared, &refined.after.model, &mut of_train);
     // Logs on which the model diverges cannot show external forces.
-    if let Ok(residual) = &diagnostics.after {
-        report_external_forces(problem, &residual.samples, &mut of_train);
-    }
+    let residual = diagnostics.after.as_ref().ok();
+    let pushed = residual
+        .and_then(|residual| report_external_forces(problem, &residual.samples, &mut of_train));
     let tested = problem.on(&prepared.test.for_fits);
     report_gravity(&shares_of_gravity(&tested), settings, &mut of_test);
     if let Ok(forces) = residual_force(&tested, &found.chosen.after) {
@@ -37,7 +59,11 @@ pub(super) fn noted(
     }
     let mut audits = [of_train, of_test].concat();
     let fitted_tests = report_fitted_tests(prepared, &mut audits);
-    (audits, fitted_tests)
+    Noted {
+        audits,
+        fitted_tests,
+        pushed,
+    }
 }
 
 /// Report in the audits which logs repeat each other; returns the test logs that repeat training logs.

@@ -9,6 +9,7 @@ use super::establish::Chosen;
 use super::fitted::Fitted;
 use super::judge::Found;
 use super::learn::{Learned, LearnedResidual};
+use super::notes::Noted;
 use super::prepare::Prepared;
 use super::problem::Problem;
 use super::refine::Refined;
@@ -134,18 +135,15 @@ impl Outcome {
 }
 
 impl Given {
-    pub(super) fn of(
-        prepared: &Prepared<'_>,
-        (audits, fitted_tests): (Vec<Audit>, Vec<String>),
-    ) -> Self {
+    pub(super) fn of(prepared: &Prepared<'_>, noted: Noted) -> Self {
         let model = &prepared.model;
         Self {
             train: Arc::clone(&prepared.train.logs),
             studied: Arc::clone(&prepared.train.for_fits),
             test: Arc::clone(&prepared.test.logs),
-            fitted_tests,
+            fitted_tests: noted.fitted_tests,
             split: prepared.split.clone(),
-            audits,
+            audits: noted.audits,
             settings: prepared.settings.clone(),
             unscored_s: prepared.unscored_s.clone(),
             prismatic: model.prismatic.clone(),

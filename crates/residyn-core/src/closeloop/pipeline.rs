@@ -51,15 +51,20 @@ pub fn solve(
     found.chosen.confirm(&mut refined);
     let diagnostics = Diagnostics::of(&found, &refined);
     let with_friction = found.problem.with_usual_friction();
-    let audits = noted(prepared, &found, with_friction.as_ref(), &diagnostics);
+    let noted = noted(
+        prepared,
+        (&found, &refined),
+        with_friction.as_ref(),
+        &diagnostics,
+    );
     let learned = learn(&refined, prepared.learner, rng, watch);
     let rivals = (with_friction.as_ref(), learned.as_ref());
     let scores = score(prepared, &found, &refined, rivals, rng, watch);
     Ok(Outcome {
         error_model: found.problem.error_model,
         verdict: scores.verdict,
-        reason: scores.reason,
-        given: Given::of(prepared, audits),
+        reason: noted.before(scores.reason),
+        given: Given::of(prepared, noted),
         models: Models::of(&found.problem, refined),
         effects: Effects::of(scores.findings, alternatives, found.chosen),
         diagnostics,

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::error_model::ErrorModel;
 use super::establish::Chosen;
+use super::every_log::SetApart;
 use super::fitted::Fitted;
 use super::problem::Problem;
 use crate::data::Log;
@@ -32,6 +33,12 @@ pub(super) fn plainer(
     let after = &chosen.after;
     if problem.added(&after.model).is_empty() {
         return None;
+    }
+    if is_harmful(problem, declared, after, apart) {
+        return Some(Plainer {
+            fitted: declared.clone(),
+            reason: "the effects that the search found are not used: they raise the error on the logs set apart".into(),
+        });
     }
     let settings = &problem.settings.select;
     let least = LeftOut::of(problem, after, apart);
@@ -83,6 +90,14 @@ pub(super) fn plainer(
             100.0 * (1.0 - (-gain).exp())
         ),
     })
+}
+
+/// Whether the declared model predicts the motion of the logs set apart better by more than chance, whatever the logs
+/// left out of the fit say: they are of the same kinds of motion as those that it saw.
+fn is_harmful(problem: &Problem<'_>, declared: &Fitted, chosen: &Fitted, apart: &[Log]) -> bool {
+    let of = |fitted| SetApart::of(problem, fitted, apart);
+    problem.error_model == ErrorModel::OutputError
+        && of(chosen).is_worse_than(&of(declared), problem.settings)
 }
 
 /// A plainer model than the chosen one, and how a sentence names what it does not use, and its error.

@@ -123,7 +123,9 @@ fn far_from_declared(problem: &Problem<'_>, refined: &Refined<'_>) -> Option<Str
         .zip(&refined.after.model.parameters)
         .filter(|(declared, fitted)| {
             let ratio = (fitted.value / declared.value).abs();
-            !declared.fixed && declared.value != 0.0 && !(1.0 / FAR..FAR).contains(&ratio)
+            // Nothing is odd about a moment or an offset that is nearly zero.
+            let vanishes = ratio < 1.0 / FAR && declared.bounds[0] >= 0.0;
+            !declared.fixed && declared.value != 0.0 && (vanishes || ratio > FAR)
         });
     let far: Vec<String> = far
         .map(|(declared, fitted)| {

@@ -34,7 +34,10 @@ pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
                 && !is_of_too_many(problem, effect)
                 && problem.declared.can_carry(effect, joint).is_ok()
             {
-                all.push(FittedEffect::absent(&problem.measured(effect, joint), joint));
+                all.push(FittedEffect::absent(
+                    &problem.measured(effect, joint),
+                    joint,
+                ));
             }
         }
     }

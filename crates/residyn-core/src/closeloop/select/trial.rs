@@ -68,7 +68,9 @@ impl Trial {
 
     fn unusual(&self) -> usize {
         let effects = self.fitted.model.effects.iter();
-        effects.filter(|effect| effect.effect.baseline.is_none()).count()
+        effects
+            .filter(|effect| effect.effect.baseline.is_none())
+            .count()
     }
 
     /// Number of parameters shifted from the values that the file fixes: of equally good sets, the one that contradicts
