@@ -170,11 +170,9 @@ impl<'a> Problem<'a> {
         share / self.parts() as f64
     }
 
-    /// An effect with bounds and starting values in a joint's own units. Friction that reverses over a range of speeds
-    /// has no shape of its own within it.
+    /// An effect with bounds and starting values in a joint's own units.
     pub fn measured(&self, effect: &Effect, joint: Joint) -> Effect {
-        let slowest = self.settings.fit.resolved_speed * self.smoothing_velocities[joint];
-        effect.measured_by(slowest, self.top_speed[joint], self.top_torque[joint])
+        effect.measured_by(self.top_speed[joint], self.top_torque[joint])
     }
 
     /// The effects that the model may lack.

@@ -117,9 +117,6 @@ settings! {
         /// baseline friction if torques are compared, which are smoothed like the motion, and with the chosen effects
         /// if the motion is, since friction on some rigs reverses over such widths.
         wider_sign_shares: [f64; 5] = [5e-4, 5e-3, 1e-2, 2e-2, 5e-2],
-        /// A speed at which friction changes, such as that of Stribeck, is at least this many smoothing velocities: the
-        /// sign of a velocity is 0.96 there.
-        resolved_speed: f64 = 2.0,
         /// Torques are compared instead of the motion if the unexplained share of the motion is at least this many
         /// times that of the torques. Arms under stiff position control are at 34 and more, pendulums below 1.
         motion_over_torque: f64 = 10.0,

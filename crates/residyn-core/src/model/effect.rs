@@ -237,23 +237,18 @@ impl Effect {
     }
 
     /// The same effect with bounds and starting values in the parameters' own units, for a joint with this highest speed
-    /// and torque in the logs. No speed is below `slowest`.
+    /// and torque in the logs.
     #[must_use]
-    pub fn measured_by(&self, slowest: f64, top_speed: f64, top_torque: f64) -> Self {
+    pub fn measured_by(&self, top_speed: f64, top_torque: f64) -> Self {
         let mut effect = self.clone();
         for parameter in &mut effect.parameters {
-            let (slowest, unit) = match std::mem::replace(&mut parameter.measure, Measure::One) {
-                Measure::One => (None, 1.0),
-                Measure::Speed => (Some(slowest), top_speed),
-                Measure::Torque => (None, top_torque),
+            let unit = match std::mem::replace(&mut parameter.measure, Measure::One) {
+                Measure::One => 1.0,
+                Measure::Speed => top_speed,
+                Measure::Torque => top_torque,
             };
             let multiples = parameter.bounds.iter_mut().chain(&mut parameter.starts);
             multiples.for_each(|value| *value *= unit);
-            if let Some(slowest) = slowest {
-                let [low, high] = &mut parameter.bounds;
-                *low = low.max(slowest).min(*high);
-                parameter.starts.retain(|start| start > low);
-            }
         }
         effect
     }
