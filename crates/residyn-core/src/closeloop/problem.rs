@@ -172,7 +172,8 @@ impl<'a> Problem<'a> {
 
     /// An effect with bounds and starting values in a joint's own units.
     pub fn measured(&self, effect: &Effect, joint: Joint) -> Effect {
-        effect.measured_by(self.top_speed[joint], self.top_torque[joint])
+        let reversal = self.smoothing_velocities[joint];
+        effect.measured_by(reversal, self.top_speed[joint], self.top_torque[joint])
     }
 
     /// The effects that the model may lack.

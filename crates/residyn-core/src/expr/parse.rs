@@ -61,6 +61,11 @@ impl Formula {
         self.root.add_names(&mut names);
         names
     }
+
+    /// Whether the formula calls this function.
+    pub fn calls(&self, function: &str) -> bool {
+        self.root.calls(function)
+    }
 }
 
 impl Kind {
@@ -75,6 +80,16 @@ impl Kind {
 }
 
 impl Term {
+    fn calls(&self, function: &str) -> bool {
+        let is_called = matches!(&self.kind, Kind::Call(own, _) if own.name() == function);
+        is_called
+            || self
+                .kind
+                .operands()
+                .iter()
+                .any(|operand| operand.calls(function))
+    }
+
     fn add_names<'t>(&'t self, names: &mut Vec<&'t str>) {
         if let Kind::Name(name) = &self.kind {
             names.push(name);

@@ -237,18 +237,26 @@ impl Effect {
     }
 
     /// The same effect with bounds and starting values in the parameters' own units, for a joint with this highest speed
-    /// and torque in the logs.
+    /// and torque in the logs, whose dry friction reverses over the speed `reversal`. Dry friction has no other shape
+    /// within its reversal: no speed at which it changes is lower.
     #[must_use]
-    pub fn measured_by(&self, top_speed: f64, top_torque: f64) -> Self {
+    pub fn measured_by(&self, reversal: f64, top_speed: f64, top_torque: f64) -> Self {
+        let is_dry = (self.entry.formula()).is_some_and(|formula| formula.calls("sign"));
+        let slowest = if is_dry { reversal } else { 0.0 };
         let mut effect = self.clone();
         for parameter in &mut effect.parameters {
-            let unit = match std::mem::replace(&mut parameter.measure, Measure::One) {
-                Measure::One => 1.0,
-                Measure::Speed => top_speed,
-                Measure::Torque => top_torque,
+            let (least, unit) = match std::mem::replace(&mut parameter.measure, Measure::One) {
+                Measure::One => (None, 1.0),
+                Measure::Speed => (Some(slowest), top_speed),
+                Measure::Torque => (None, top_torque),
             };
             let multiples = parameter.bounds.iter_mut().chain(&mut parameter.starts);
             multiples.for_each(|value| *value *= unit);
+            if let Some(least) = least {
+                let [low, high] = &mut parameter.bounds;
+                *low = low.max(least).min(*high);
+                parameter.starts.retain(|start| start > low);
+            }
         }
         effect
     }
@@ -355,5 +363,22 @@ mod tests {
         ] {
             assert_eq!(over(other, &[]), None, "{other}");
         }
+    }
+    #[test]
+    fn dry_friction_changes_at_no_speed_within_its_reversal() {
+        let library = Library::built_in();
+        let speed = |effect: &str, parameter: &str, reversal: f64| {
+            let effect = library.effect(effect).unwrap();
+            let measured = effect.measured_by(reversal, 10.0, 1.0);
+            let mut parameters = measured.parameters.into_iter();
+            let speed = parameters.find(|own| own.name == parameter).unwrap();
+            (speed.bounds, speed.starts)
+        };
+        let stribeck = |reversal: f64| speed("stribeck_friction", "v_s", reversal);
+        assert_eq!(stribeck(0.0), ([0.1, 10.0], vec![0.2, 0.5, 1.0, 2.0]));
+        assert_eq!(stribeck(0.7), ([0.7, 10.0], vec![1.0, 2.0]));
+        assert_eq!(stribeck(20.0), ([10.0, 10.0], vec![]));
+        let degressive = |reversal: f64| speed("degressive_friction", "v_d", reversal);
+        assert_eq!(degressive(0.7), degressive(0.0));
     }
 }
