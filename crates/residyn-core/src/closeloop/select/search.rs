@@ -334,15 +334,13 @@ impl<'a> Search<'a> {
             let without = |k: usize| [&effects[declared..k], &effects[k + 1..]].concat();
             sets.extend(added.map(without));
             let good = self.as_good_as(best, &current, sets);
-            let settings = &problem.settings.select;
-            let is_simpler = |trial: &Trial| {
-                trial.values() < current.values() || trial.is_more_usual_than(&current, settings)
-            };
+            let is_simpler = |trial: &Trial| trial.values() < current.values();
             let (mut good, mut other): (Vec<_>, Vec<_>) = good.into_iter().partition(is_simpler);
             if good.is_empty() {
                 // An exchange may make other effects redundant.
                 other.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
-                let few = other.iter().take(settings.simplified_exchanges);
+                let few = problem.settings.select.simplified_exchanges;
+                let few = other.iter().take(few);
                 good = few.map(|trial| self.least(trial, best)).collect();
                 good.retain(is_simpler);
             }

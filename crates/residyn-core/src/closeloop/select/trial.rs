@@ -58,21 +58,6 @@ impl Trial {
         (self.fitted.fit.columns.len(), contained.sum())
     }
 
-    /// Whether the set has as many values as another, more of them of effects that most machines have, and a loss that is
-    /// not noticeably larger.
-    pub fn is_more_usual_than(&self, other: &Self, settings: &SelectSettings) -> bool {
-        self.values() == other.values()
-            && self.unusual() < other.unusual()
-            && self.loss() < other.loss() * (1.0 + settings.negligible_rise)
-    }
-
-    fn unusual(&self) -> usize {
-        let effects = self.fitted.model.effects.iter();
-        effects
-            .filter(|effect| effect.effect.baseline.is_none())
-            .count()
-    }
-
     /// Number of parameters shifted from the values that the file fixes: of equally good sets, the one that contradicts
     /// the file least is chosen.
     pub fn shifts(&self) -> usize {
