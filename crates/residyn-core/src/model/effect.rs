@@ -255,7 +255,7 @@ impl Effect {
             if let Some(least) = least {
                 let [low, high] = &mut parameter.bounds;
                 *low = low.max(least).min(*high);
-                parameter.starts.retain(|start| start > low);
+                parameter.starts.retain(|start| start >= low);
             }
         }
         effect
@@ -364,6 +364,7 @@ mod tests {
             assert_eq!(over(other, &[]), None, "{other}");
         }
     }
+
     #[test]
     fn dry_friction_changes_at_no_speed_within_its_reversal() {
         let library = Library::built_in();
