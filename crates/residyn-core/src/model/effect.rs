@@ -255,7 +255,8 @@ impl Effect {
             if let Some(least) = least {
                 let [low, high] = &mut parameter.bounds;
                 *low = low.max(least).min(*high);
-                parameter.starts.retain(|start| start >= low);
+                // A start at the bound would be the shape of the reversal itself.
+                parameter.starts.retain(|start| start > low);
             }
         }
         effect
