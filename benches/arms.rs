@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 use residyn::read_model;
 use residyn_core::expr::Program;
 use residyn_core::lanes::{Element, Row};
-use residyn_core::model::chain::{Chain, Drivetrain, Inertia, Joint, Pose, model_text};
+use residyn_core::model::tree::{Drivetrain, Inertia, Joint, Pose, Tree, model_text};
 use residyn_core::model::{Library, Model};
 
 /// Each time is the best of this many runs.
@@ -24,6 +24,7 @@ fn chain(joints: usize) -> Model {
     let joint = |k: usize| Joint {
         name: format!("joint{}", k + 1),
         body: format!("link{}", k + 1),
+        parent: k.checked_sub(1),
         slides: false,
         pose: Pose {
             // Quarter turns, now about x and now back.
@@ -48,16 +49,16 @@ fn chain(joints: usize) -> Model {
         follows: None,
         drivetrain: Drivetrain::default(),
     };
-    let chain = Chain {
-        name: format!("chain of {joints}"),
+    let tree = Tree {
+        name: format!("tree of {joints}"),
         gravity: Vector3::new(0.0, 0.0, -9.81),
         joints: (0..joints).map(joint).collect(),
         drive: None,
         notes: Vec::new(),
     };
     let library = Library::built_in();
-    let text = model_text(&chain);
-    Model::from_text(Path::new("chain.toml"), &text, library.effects()).expect("a chain")
+    let text = model_text(&tree);
+    Model::from_text(Path::new("tree.toml"), &text, library.effects()).expect("a tree")
 }
 
 /// Nanoseconds per state; inputs from `held` on are parameters with these values.
@@ -83,7 +84,7 @@ fn nanoseconds<T: Element, const W: usize>(program: &Program, held: usize, value
 
 fn tell(model: &Model, called: &serde_json::Value) {
     let joints = model.joints;
-    let inverse = model.torque_balance().expect("a chain has torques");
+    let inverse = model.torque_balance().expect("a tree has torques");
     let forward = model.dynamics();
     for (what, dynamics, held) in [
         ("inverse", &inverse, 4 * joints + 1),

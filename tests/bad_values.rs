@@ -247,8 +247,8 @@ value = 15.0 | value = nan                                  | line 7, column 17 
 value = 15.0 | value = inf                                  | line 7, column 17 ... not a finite number
 value = 15.0 | value = 1e999                                | line 7, column 17 ... not a finite number
 value = 15.0 | value = 99999999999999999999                 | line 7 ... a decimal number
-joints = 1   | joints = 50                                  | line 4 ... `joints` must be from 1 to 12, found 50
-joints = 1   | joints = 1000000000                          | line 4 ... `joints` must be from 1 to 12, found 1000000000
+joints = 1   | joints = 50                                  | line 4 ... `joints` must be from 1 to 40, found 50
+joints = 1   | joints = 1000000000                          | line 4 ... `joints` must be from 1 to 40, found 1000000000
 sin(q1) + C_i * tau1 | 1e999 * tau1                         | line 11 ... `1e999` is not a number
 [parameters] | [parameters]\n"a b" = { value = 1.0 }        | line 7 ... cannot be used in formulas
 [parameters] | [parameters]\n"" = { value = 1.0 }           | line 7 ... cannot be used in formulas

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use residyn::read_model;
 use residyn::{Library, Model};
 use residyn_core::data::Joint;
-use residyn_core::model::chain::model_text;
+use residyn_core::model::tree::model_text;
 use residyn_core::sim::Integrator;
 use residyn_formats::{ExportModel, find};
 use serde_json::Value;
@@ -345,6 +345,92 @@ mod slow {
         assert!(holds(estimate, 0.061 + 0.02), "{estimate:?}");
     }
 
+    /// A machine with two legs on a fixed base, each with the arm's links and drives.
+    fn legs(left: [&str; 2], right: [&str; 2]) -> String {
+        let leg = |side: &str, y: f64, [hip, knee]: [&str; 2]| {
+            format!(
+                r#"
+      <body name="{side}_thigh" pos="0 {y} 0">
+        <joint name="{side}_hip" axis="0 1 0" damping="0.3" {hip}/>
+        <inertial pos="0 0 -0.15" mass="0.8" diaginertia="0.007 0.007 0.0005"/>
+        <body name="{side}_shank" pos="0 0 -0.3">
+          <joint name="{side}_knee" axis="0 1 0" {knee}/>
+          <inertial pos="0 0 -0.12" mass="0.4" diaginertia="0.0025 0.0025 0.0002"/>
+        </body>
+      </body>"#
+            )
+        };
+        let drive = |side: &str| {
+            format!(
+                r#"
+    <position joint="{side}_hip" kp="60" kv="2" forcerange="-12 12"/>
+    <position joint="{side}_knee" kp="25" kv="0.8" forcerange="-5 5"/>"#
+            )
+        };
+        format!(
+            r#"<mujoco model="two legs">
+  <compiler angle="radian"/>
+  <option timestep="0.00005"/>
+  <worldbody>
+    <body name="trunk" pos="0 0 1">{}{}
+    </body>
+  </worldbody>
+  <actuator>{}{}
+  </actuator>
+</mujoco>
+"#,
+            leg("left", 0.1, left),
+            leg("right", -0.1, right),
+            drive("left"),
+            drive("right")
+        )
+    }
+
+    /// Targets of four joints, without a torque: what the law of the drives asks for is compared, leg by leg, and the motion
+    /// judges.
+    #[test]
+    fn what_a_drawing_of_two_legs_lacks_is_named_on_the_leg_that_lacks_it() {
+        if std::env::var_os("RESIDYN_PYTHON").is_none() {
+            eprintln!("SKIPPED: RESIDYN_PYTHON is not set; run tests/run");
+            return;
+        }
+        let scratch = Scratch::new();
+        let friction = |level: f64| format!("frictionloss=\"{level}\" solreffriction=\"0.0005 1\"");
+        let (worn, usual) = (friction(0.4), friction(0.15));
+        scratch.file("drawn.xml", legs([""; 2], [""; 2]));
+        scratch.file("built.xml", legs(["", &usual], [&worn, &usual]));
+        let files = ["built.xml", "run1.csv", "run2.csv", "run3.csv", "run4.csv"]
+            .map(|name| scratch.path(name));
+        let mut arguments: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+        arguments.insert(1, Path::new("0"));
+        client("servo.py", &arguments);
+        scratch.succeeds("new --from-mjcf drawn.xml --out legs.toml");
+        let known = scratch.read("legs.toml");
+        let known = known.replace("unit = \"N m/rad\"", "unit = \"N m/rad\", fixed = true");
+        let known = known.replace("unit = \"N m s/rad\"", "unit = \"N m s/rad\", fixed = true");
+        scratch.file("legs.toml", known);
+        let report = scratch.json(&format!("closeloop --model legs.toml {LOGS}"));
+        for (joint, level) in [(2, 0.15), (3, 0.4), (4, 0.15)] {
+            let [value, ..] = found(&report, "coulomb_friction", joint).unwrap();
+            assert!(
+                (value - level).abs() < 0.01 * level,
+                "joint {joint}: {value}"
+            );
+        }
+        let effects = report["effects"].as_array().unwrap();
+        assert!(
+            effects.iter().all(|effect| effect["joint"] != 1),
+            "{report:#}"
+        );
+        assert!(report["torque"].is_object());
+        let error = |key: &str| {
+            report["error"][key]["position_rmse"][1][2]
+                .as_f64()
+                .unwrap()
+        };
+        assert!(error("after") < 0.2 * error("before"), "{report:#}");
+    }
+
     #[test]
     fn what_a_servo_hides_is_named() {
         let scratch = Scratch::new();
@@ -361,9 +447,11 @@ mod slow {
             &scratch.read("out/report.md"),
             &["under the logged commands", "`cmd1(t - d1)`"],
         );
-        // The logs hold no torque, so none can be compared.
+        // The logs hold no torque: what the law of the drive asks for is compared on request only.
         assert!(report["torque"].is_null());
-        let said = scratch.refuses("closeloop --model servo --train run1.csv --errors torque");
-        says(&said, &["servo is driven by commands"]);
+        let report = scratch.json(&format!("closeloop --model servo --errors torque {LOGS}"));
+        assert!(report["torque"].is_object());
+        let estimate = found(&report, "coulomb_friction", 1).unwrap();
+        assert!(holds(estimate, 0.12), "{estimate:?}");
     }
 }

@@ -64,7 +64,7 @@ fn the_library_names_no_flag() {
 const MENDED: &str = "
 closeloop --model pendulum --out out --train long.csv --test short.csv | the test logs contain no window ... --test names the test logs
 closeloop --model pendulum --out out --train long.csv --errors torque | torques cannot be compared ... pendulum gives accelerations ... --errors motion compares the motion
-new --from-urdf y.urdf | branches ... --tip names the last body
+new --from-urdf y.urdf | joint `j40` is one too many: at most 40 ... --tip names the last body
 ";
 
 #[test]
@@ -73,10 +73,16 @@ fn the_command_line_says_which_flag_mends_an_error() {
     let times = (0..9).map(|row| 0.01 * f64::from(row));
     scratch.log_at("short.csv", times, |_| [0.0; 3]);
     scratch.log("long.csv", swinging);
-    let branches = r#"<robot name="y"><link name="base"/><link name="a"/><link name="b"/>
-<joint name="ja" type="continuous"><parent link="base"/><child link="a"/></joint>
-<joint name="jb" type="continuous"><parent link="base"/><child link="b"/></joint></robot>"#;
-    scratch.file("y.urdf", branches);
+    let spokes = (0..41).map(|k| {
+        format!(
+            r#"<link name="l{k}"/><joint name="j{k}" type="continuous"><parent link="base"/><child link="l{k}"/></joint>"#
+        )
+    });
+    let spokes: String = spokes.collect();
+    scratch.file(
+        "y.urdf",
+        format!(r#"<robot name="y"><link name="base"/>{spokes}</robot>"#),
+    );
     for [line, words] in rows(MENDED) {
         says_words(&scratch.refuses(&line), &words);
     }

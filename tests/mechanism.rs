@@ -4,7 +4,7 @@ use std::fs;
 
 use residyn_core::expr::SignForm;
 use residyn_core::model::Dynamics;
-use residyn_core::model::chain::{Chain, model_text};
+use residyn_core::model::tree::{Tree, model_text};
 
 use crate::support::catalogue::{assert_energy_balanced, dynamics, points};
 use crate::support::mechanisms::{
@@ -19,7 +19,7 @@ fn independent() -> impl Iterator<Item = &'static str> {
     alone.map(|(name, _)| name)
 }
 
-fn chain(name: &str) -> Chain {
+fn tree(name: &str) -> Tree {
     read(&fixture(name))
 }
 
@@ -63,7 +63,7 @@ fn inverse_mass(model: &Dynamics, point: &[f64]) -> nalgebra::DMatrix<f64> {
 #[test]
 fn the_mass_matrix_is_symmetric_and_positive() {
     for name in independent() {
-        let model = dynamics(&system(&chain(name)), &[], SignForm::Exact);
+        let model = dynamics(&system(&tree(name)), &[], SignForm::Exact);
         for mut point in states(&model, 100) {
             point[model.joints..2 * model.joints].fill(0.0);
             let inverse = inverse_mass(&model, &point);
@@ -79,7 +79,7 @@ fn the_mass_matrix_is_symmetric_and_positive() {
 #[test]
 fn base_parameters_are_linearly_independent() {
     for name in independent() {
-        let system = system(&chain(name));
+        let system = system(&tree(name));
         let model = comparable(&system);
         let n = model.joints;
         let values = model.values();
@@ -113,8 +113,8 @@ fn base_parameters_are_linearly_independent() {
 
 #[test]
 fn a_planar_arm_has_the_parameters_of_a_textbook() {
-    let chain = chain("planar_2r.urdf");
-    let system = system(&chain);
+    let tree = tree("planar_2r.urdf");
+    let system = system(&tree);
     let names: Vec<&str> = system.parameters.iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ["zz_1", "mx_1", "zz_2", "mx_2", "g"]);
     let value = |k: usize| system.parameters[k].value;
@@ -128,7 +128,7 @@ fn a_planar_arm_has_the_parameters_of_a_textbook() {
     for (k, wanted) in wanted.into_iter().enumerate() {
         assert!((value(k) - wanted).abs() < 1e-14, "{}", names[k]);
     }
-    let text = model_text(&chain);
+    let text = model_text(&tree);
     assert!(
         text.contains("M11 = \"zz_1 + zz_2 - 1.2*mx_2*cos(q2)\""),
         "{text}"
@@ -137,7 +137,7 @@ fn a_planar_arm_has_the_parameters_of_a_textbook() {
 
 #[test]
 fn properties_that_are_not_carried_are_noted() {
-    let notes = chain("prr.xml").notes;
+    let notes = tree("prr.xml").notes;
     assert_eq!(
         notes,
         [
@@ -167,13 +167,12 @@ fn new_writes_a_model_file_that_other_commands_read() {
 
 /// A fixture, one of its texts, what stands there instead, and words of the message.
 const REFUSED: &str = r#"
-planar_2r.urdf | type="continuous"       | type="floating"                    | planar_2r.urdf, line 20, column 29 ... `elbow` ... `floating` ... fix the joint
+planar_2r.urdf | type="continuous"       | type="planar"                      | planar_2r.urdf, line 20, column 29 ... `elbow` ... `planar` ... fix the joint
 planar_2r.urdf | <limit lower            | <mimic joint="elbo"/><limit lower  | line 5, column 3 ... `shoulder` follows `elbo` ... fix the joint
 planar_2r.urdf | <parent link="upper"/>  | <parent link="uper"/>              | line 21, column 19 ... no link `uper`
 planar_2r.urdf | <child link="fore"/>    | <child link="upper"/>              | line 20, column 3 ... closes a loop ... open the loop
 planar_2r.urdf | <child link="upper"/>   | <child link="base"/>               | loop
 planar_2r.urdf | </robot>                | <link name="x"/></robot>           | line 34 ... second link
-planar_2r.urdf | </robot> | <link name="x"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link><joint name="j" type="revolute"><parent link="upper"/><child link="x"/></joint></robot> | line 34 ... branches ... `fore` and `x` ... such as `upper`
 planar_2r.urdf | value="0.8"             | value="${m}"                       | line 30, column 20 ... not a number ... xacro
 planar_2r.urdf | value="0.8"             | value="-0.8"                       | line 31 ... mass of `fore` ... above zero
 planar_2r.urdf | izz="0.001"             | izz="0.1"                          | line 31 ... `fore` ... sum of the others
@@ -181,7 +180,6 @@ planar_2r.urdf | xyz="0 1 0"             | xyz="0 1"                          | 
 planar_2r.urdf | damping="0.02"          | damping="-1"                       | line 25, column 24 ... give zero or a positive number
 planar_2r.urdf | </robot>                |                                    | not valid XML
 prr.xml        | type="slide"            | type="ball"                        | prr.xml, line 7 ... `ball` ... hinge and slide
-prr.xml        | <joint name="rail"      | <freejoint/><joint name="rail"     | line 7 ... remove it
 prr.xml        | armature="0.003"/>\n          <inertial pos="0 0 -0.2" mass="0.3" diaginertia="0.006 0.006 0.0004" xyaxes="1 0.1 0 0 1 0.3"/> | /> | line 13 ... `end` moves nothing that has inertia ... <inertial>
 prr.xml        | stiffness="1.5"         | stiffness="1 2"                    | line 10 ... polynomial
 prr.xml        | <actuator>              | <equality><joint joint1="end"/></equality><actuator> | line 19 ... closes a loop ... remove
@@ -193,7 +191,42 @@ geoms.xml      | zaxis="0.1 0.2 1"       | zaxis="0.1 0.2 1" euler="0 0 1"    | 
 "#;
 
 #[test]
-fn anything_but_a_serial_chain_is_refused_with_place_and_remedy() {
+fn floating_bases_are_fixed_with_a_note() {
+    for (name, from, to, note) in [
+        (
+            "planar_2r.urdf",
+            "type=\"continuous\"",
+            "type=\"floating\"",
+            "line 20: `elbow` floats; its child is fixed where the file draws it",
+        ),
+        (
+            "prr.xml",
+            "<joint name=\"rail\"",
+            "<freejoint/><joint name=\"rail\"",
+            "line 7: this body is free to move in the file; it is fixed where the file draws it",
+        ),
+    ] {
+        let scratch = Scratch::new();
+        let contents = fs::read_to_string(fixture(name)).unwrap();
+        let model = system(&read(&fixture(name)));
+        scratch.file(name, replaced(&contents, from, to));
+        let format = format_of(&fixture(name)).name;
+        let value = scratch.json(&format!("new --from-{format} {name}"));
+        let notes: Vec<&str> = value["notes"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter_map(|n| n.as_str())
+            .collect();
+        assert!(notes.contains(&note), "{notes:?}");
+        let fixed = system(&read(&scratch.path(name)));
+        let moving = model.joints - usize::from(name == "planar_2r.urdf");
+        assert_eq!(fixed.joints, moving, "{name}");
+    }
+}
+
+#[test]
+fn anything_but_a_tree_of_joints_is_refused_with_place_and_remedy() {
     for [name, from, to, words] in rows(REFUSED) {
         let scratch = Scratch::new();
         let contents = fs::read_to_string(fixture(&name)).unwrap();
@@ -221,7 +254,7 @@ fn a_file_of_the_other_format_is_recognised() {
 
 #[test]
 fn angles_that_were_rounded_are_taken_as_written_and_noted() {
-    let notes = chain("rounded_2r.urdf").notes;
+    let notes = tree("rounded_2r.urdf").notes;
     let note = "line 23: `rpy`: 1.5708 is taken as written; if 1.5707963267948966 is meant, writing it so makes shorter equations";
     assert!(notes.contains(&note.to_owned()), "{notes:?}");
     let scratch = Scratch::new();
@@ -237,7 +270,7 @@ mod slow {
     #[test]
     fn mujoco_finds_the_same_torques() {
         for name in independent() {
-            mujoco_agrees(&fixture(name), &comparable(&system(&chain(name))));
+            mujoco_agrees(&fixture(name), &comparable(&system(&tree(name))));
         }
     }
 }

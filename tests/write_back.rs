@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use residyn::Library;
 use residyn::read_model;
 use residyn_core::model::Model;
-use residyn_core::model::chain::{Chain, model_text};
+use residyn_core::model::tree::{Tree, model_text};
 use residyn_formats::write_back;
 
 use crate::support::catalogue::points;
@@ -14,12 +14,12 @@ use crate::support::mechanisms::{FILES, comparable, fixture, mujoco_agrees, read
 use crate::support::tables::rows;
 use crate::support::{Scratch, replaced, says, succeeds, text};
 
-/// The chain as a fit might find it: every body heavier and wider, more friction, and larger rotors if the format has
+/// The tree as a fit might find it: every body heavier and wider, more friction, and larger rotors if the format has
 /// rotors.
-fn as_fitted(file: &Path, tip: Option<&str>) -> Chain {
-    let mut chain = read_to(file, tip);
+fn as_fitted(file: &Path, tip: Option<&str>) -> Tree {
+    let mut tree = read_to(file, tip);
     let has_rotors = file.extension().unwrap() == "xml";
-    for (k, joint) in (1..).zip(&mut chain.joints) {
+    for (k, joint) in (1..).zip(&mut tree.joints) {
         let more = 1.0 + 0.03 * f64::from(k);
         joint.inertia.mass *= more;
         joint.inertia.moment *= more;
@@ -30,11 +30,11 @@ fn as_fitted(file: &Path, tip: Option<&str>) -> Chain {
             joint.drivetrain.armature += if has_rotors { 0.02 } else { 0.0 };
         }
     }
-    chain
+    tree
 }
 
 /// A description with these values, in a new file.
-fn written(folder: &Path, file: &Path, tip: Option<&str>, values: &Chain) -> PathBuf {
+fn written(folder: &Path, file: &Path, tip: Option<&str>, values: &Tree) -> PathBuf {
     let model = folder.join("model.toml");
     fs::write(&model, model_text(values)).unwrap();
     let out = folder.join(file.file_name().unwrap());
@@ -50,7 +50,7 @@ fn nothing_else_in_the_file_changes() {
     for (name, tip) in FILES {
         let file = fixture(name);
         let original = fs::read_to_string(&file).unwrap();
-        let with = |values: &Chain| {
+        let with = |values: &Tree| {
             let out = written(folder.path(), &file, tip, values);
             fs::read_to_string(out).unwrap()
         };
@@ -158,7 +158,7 @@ mod slow {
                     wanted.name
                 );
             }
-            let [found, wanted] = [&again, &values].map(|chain| comparable(&system(chain)));
+            let [found, wanted] = [&again, &values].map(|tree| comparable(&system(tree)));
             let n = wanted.joints;
             for point in points(&wanted, 100, 5) {
                 let moving = &point[..3 * n + 1];

@@ -193,7 +193,7 @@ fn torques(error: &TorqueError) -> String {
     for (joint, rms) in Joint::all(error.rms.len()).zip(&error.rms) {
         let _ = writeln!(out, "{joint:>5}  {rms:>10.5}");
     }
-    let _ = writeln!(out, "relative to the logged torques: {}", error.share());
+    let _ = writeln!(out, "relative to the torques that act: {}", error.share());
     out
 }
 

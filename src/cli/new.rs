@@ -8,14 +8,14 @@ use super::{Answer, Common, terminal};
 use residyn_formats::{FORMATS, Format, RobotReader, model_of};
 use residyn_io::files::write_whole;
 
-/// Write a model file for a serial mechanism, its equations derived from a robot description
+/// Write a model file for a mechanism on a fixed base, its equations derived from a robot description
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  residyn new --from-urdf arm.urdf --tip tool0 --out arm.toml")]
 pub(super) struct Arguments {
     #[command(flatten)]
     description: Description,
-    /// The last link of the chain (a body in MJCF); without it, the end of the longest branch. Other branches are held
-    /// as the file draws them
+    /// The last link of one limb (a body in MJCF): the model has only the joints on the way there, and the others are held
+    /// as the file draws them. Without it, the model has all joints
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
     /// What drives the joints, if their logs hold commands instead of torques: one of `residyn list drives`
@@ -86,11 +86,11 @@ impl FromArgMatches for Description {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let Description { reader, file } = &arguments.description;
     let (tip, drive) = (arguments.tip.as_deref(), arguments.drive.as_deref());
-    let mut chain = reader.chain(file, tip, drive)?;
+    let mut tree = reader.tree(file, tip, drive)?;
     if arguments.bare_joints {
-        chain = chain.with_bare_joints();
+        tree = tree.with_bare_joints();
     }
-    let (model, notes) = (model_of(&chain)?, &chain.notes);
+    let (model, notes) = (model_of(&tree)?, &tree.notes);
     let text = &model.text;
     for note in notes {
         terminal::say(format!("note: {note}"));

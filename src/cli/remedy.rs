@@ -142,9 +142,7 @@ fn of_file(error: &FileError) -> Option<&'static str> {
 fn of_study(error: &StudyError) -> Option<&'static str> {
     match error {
         StudyError::NoTest { .. } => Some("--test names the test logs"),
-        StudyError::NoTorques { .. } | StudyError::Commanded { .. } => {
-            Some("--errors motion compares the motion")
-        }
+        StudyError::NoTorques { .. } => Some("--errors motion compares the motion"),
         StudyError::NotOfMotion => {
             Some("leave --calibrate out, or compare the motion with --errors motion")
         }

@@ -1,6 +1,6 @@
-"""Random motions of public arms, with the torques that Pinocchio and MuJoCo find for them, as JSON.
+"""Random motions of public robots, with the torques that Pinocchio and MuJoCo find for them, as JSON.
 
-Arguments: a folder of descriptions of our own, and the file to write. Other arms are those of the package
+Arguments: a folder of descriptions of our own, and the file to write. Other robots are those of the package
 example-robot-data.
 """
 
@@ -13,8 +13,8 @@ import mujoco
 import numpy
 import pinocchio
 
-# File, last link of the chain.
-ARMS = [
+# File, last link of the chain; the whole tree without one.
+ROBOTS = [
     ("panda_description/urdf/panda.urdf", "panda_link8"),
     ("panda_description/urdf/panda.urdf", None),
     ("ur_description/urdf/ur10_robot.urdf", "tool0"),
@@ -26,6 +26,12 @@ ARMS = [
     ("so_arm_description/urdf/so101.urdf", None),
     ("tiago_description/robots/tiago_no_hand.urdf", "arm_7_link"),
     ("baxter_description/urdf/baxter.urdf", "left_gripper"),
+    ("go2_description/urdf/go2.urdf", None),
+    ("b1_description/urdf/b1-z1.urdf", None),
+    ("g1_description/urdf/g1_29dof_rev_1_0.urdf", None),
+    ("talos_data/robots/talos_reduced.urdf", None),
+    ("tiago_pro_description/robots/tiago_pro.urdf", None),
+    ("alex_description/urdf/alex_sake_hands.urdf", None),
 ]
 OWN = [("linkage_4r.urdf", "hand")]
 SAMPLES = 100
@@ -41,19 +47,30 @@ def path_to(robot, tip):
     return [joint for joint in path if joint.get("type") != "fixed"]
 
 
-def longest(robot):
-    """The link at the end of the chain with most joints that follow no other."""
-    def depth(link):
-        return sum(joint.find("mimic") is None for joint in path_to(robot, link.get("name")))
+def joints_of(robot):
+    """All joints that move: each before those that it carries, limb by limb."""
+    below = {}
+    for joint in robot.iter("joint"):
+        if joint.find("child") is not None:
+            below.setdefault(joint.find("parent").get("link"), []).append(joint)
 
-    return max(robot.iter("link"), key=depth).get("name")
+    def beyond(link):
+        for joint in below.get(link, []):
+            yield joint
+            yield from beyond(joint.find("child").get("link"))
+
+    links = {link.get("name") for link in robot.iter("link")}
+    carried = {joint.find("child").get("link") for joints in below.values() for joint in joints}
+    (base,) = links - carried
+    return [joint for joint in beyond(base) if joint.get("type") not in ("fixed", "floating")]
 
 
 def bare(file, tip):
-    """The file without shapes, with all joints off the path to `tip` fixed and those that follow others freed, the names of
-    those on the path, and for each of them the joint that leads it (itself, if it follows none), ratio and offset."""
+    """The file without shapes, with all joints off the path to `tip`, if there is one, fixed and those that follow others
+    freed, the names of the others, and for each of them the joint that leads it (itself, if it follows none), ratio and
+    offset."""
     robot = tree.parse(file).getroot()
-    path = path_to(robot, tip or longest(robot))
+    path = path_to(robot, tip) if tip else joints_of(robot)
     leaders = {joint.get("name"): (joint.get("name"), 1.0, 0.0) for joint in path}
     for joint in robot.iter("joint"):
         if joint not in path and joint.get("type") is not None:
@@ -105,7 +122,7 @@ class Mujoco:
         return [float(self.data.qfrc_inverse[joint.dofadr][0]) for joint in self.joints]
 
 
-def of_arm(file, tip, draw):
+def of_robot(file, tip, draw):
     text, leaders = bare(file, tip)
     joints = [name for name, (leader, _, _) in leaders.items() if leader == name]
     peers = [("Pinocchio", Pinocchio(text, leaders))]
@@ -140,5 +157,5 @@ prefixes = [pathlib.Path(folder) / "cmeel.prefix/share/example-robot-data/robots
 folder = next(prefix for prefix in prefixes if prefix.is_dir())
 own, out = map(pathlib.Path, sys.argv[1:])
 draw = numpy.random.default_rng(0)
-arms = [(folder / file, tip) for file, tip in ARMS] + [(own / file, tip) for file, tip in OWN]
-out.write_text(json.dumps([of_arm(file, tip, draw) for file, tip in arms]))
+robots = [(folder / file, tip) for file, tip in ROBOTS] + [(own / file, tip) for file, tip in OWN]
+out.write_text(json.dumps([of_robot(file, tip, draw) for file, tip in robots]))

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use rand::RngExt;
 use residyn_core::lanes::Row;
-use residyn_core::model::chain::model_text;
+use residyn_core::model::tree::model_text;
 use residyn_core::model::{Library, Model};
 use residyn_core::sim::{Commands, Hold, Integrator, StepTorque};
 use residyn_formats::{ExportModel, Predictions, Samples, find};

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use residyn_core::model::chain::model_text;
+use residyn_core::model::tree::model_text;
 use residyn_core::model::{Library, Model};
 use residyn_core::sim::Integrator;
 use residyn_formats::{ExportModel, FORMATS, find};

@@ -5,14 +5,14 @@ use std::f64::consts::TAU;
 use rand::RngExt;
 use residyn_core::data::{Log, TorqueColumn};
 use residyn_core::model::Model;
-use residyn_core::model::chain::Chain;
+use residyn_core::model::tree::Tree;
 
 use super::catalogue::rng;
 use super::mechanisms::system;
 
-/// The model of a chain, its bodies only, without the effects on the joints.
-pub fn model(chain: &Chain) -> Model {
-    system(chain).with_effects(Vec::new())
+/// The model of a tree, its bodies only, without the effects on the joints.
+pub fn model(tree: &Tree) -> Model {
+    system(tree).with_effects(Vec::new())
 }
 
 /// The model with every body off by 10 to 25 %, the same in shape: still physical.

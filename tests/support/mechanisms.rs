@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rand::RngExt;
 use residyn_core::expr::SignForm;
-use residyn_core::model::chain::{Chain, model_text};
+use residyn_core::model::tree::{Tree, model_text};
 use residyn_core::model::{Dynamics, FittedEffect, Library, Model};
 use residyn_formats::{FORMATS, Format};
 use serde_json::json;
@@ -14,11 +14,12 @@ use super::catalogue::{dynamics, rng};
 use super::clients::client;
 use super::paths::ours;
 
-/// The descriptions among the fixtures, with the last link of the chain.
-pub const FILES: [(&str, Option<&str>); 7] = [
+/// The descriptions among the fixtures, with the last link of the tree.
+pub const FILES: [(&str, Option<&str>); 8] = [
     ("planar_2r.urdf", None),
     ("rounded_2r.urdf", None),
     ("spatial_3r.urdf", None),
+    ("tree_3r.urdf", None),
     ("rp.xml", None),
     ("prr.xml", None),
     ("geoms.xml", None),
@@ -36,24 +37,19 @@ pub fn format_of(file: &Path) -> &'static Format {
     formats.find(|f| extension == f.extension).unwrap()
 }
 
-/// The chain of a description to the link `tip`.
-pub fn read_to(file: &Path, tip: Option<&str>) -> Chain {
+/// The tree of a description to the link `tip`.
+pub fn read_to(file: &Path, tip: Option<&str>) -> Tree {
     (format_of(file).robots.as_ref().unwrap().read)(file, tip).unwrap()
 }
 
-pub fn read(file: &Path) -> Chain {
+pub fn read(file: &Path) -> Tree {
     read_to(file, None)
 }
 
 /// A model as `residyn new` writes it.
-pub fn system(chain: &Chain) -> Model {
+pub fn system(tree: &Tree) -> Model {
     let library = Library::built_in();
-    Model::from_text(
-        Path::new(&chain.name),
-        &model_text(chain),
-        library.effects(),
-    )
-    .unwrap()
+    Model::from_text(Path::new(&tree.name), &model_text(tree), library.effects()).unwrap()
 }
 
 /// The model, keeping only effects that are forces of the state: in MuJoCo dry friction and limits are constraints.

@@ -10,8 +10,8 @@ pub const MODEL_TERMS: usize = 20_000;
 pub const MODEL_NAMES: usize = 1000;
 /// Free parameters of a model that closing the loop fits at once: the time of a fit grows with the cube of their number.
 pub const FITTED_PARAMETERS: usize = 500;
-/// Joints of a model: enough for every serial arm, and a limit that catches slips such as `joints = 100`.
-pub const JOINTS: usize = 12;
+/// Joints of a model: enough for a humanoid with hands, and a limit that catches slips such as `joints = 100`.
+pub const JOINTS: usize = 40;
 /// Nested elements of a robot description, and joints in series.
 pub const XML_DEPTH: usize = 200;
 /// Attributes of one element of a robot description, and namespaces in all of it.

@@ -11,7 +11,7 @@ use super::verify::{Client, ClientError, Predictions, Samples};
 use super::xml::Source;
 use residyn_core::data::Joint;
 use residyn_core::limits::DELAY_STEPS;
-use residyn_core::model::chain::{Chain, model_text};
+use residyn_core::model::tree::{Tree, model_text};
 use residyn_core::model::{CommandFilter, FileError, Library, Model, NetworkError, ReadyDrive};
 use residyn_io::files::{OutputError, write_whole};
 
@@ -36,13 +36,13 @@ pub struct Format {
     pub robots: Option<RobotReader>,
 }
 
-/// Reads a serial chain of bodies from a robot description, and writes values into it.
+/// Reads a tree of bodies from a robot description, and writes values into it.
 #[derive(Debug)]
 pub struct RobotReader {
     /// What can be read, in a few words.
     pub about: &'static str,
-    /// The chain that ends at the named body, by default at the end of the longest branch.
-    pub read: fn(&Path, Option<&str>) -> Result<Chain, FileError>,
+    /// The whole tree, or the branch that ends at the named body.
+    pub read: fn(&Path, Option<&str>) -> Result<Tree, FileError>,
     /// The root element of its files.
     pub root: &'static str,
     /// The effects that its joints can hold.
@@ -58,47 +58,47 @@ pub struct RobotReader {
 pub(crate) type Rewrite = fn(&Source<'_>, &mut Edit<'_>, &[Change]) -> Result<(), FileError>;
 
 impl RobotReader {
-    /// The model of the chain that ends at the body `tip`, by default at the end of the longest branch, and notes on
+    /// The model of the tree, or of its branch that ends at the body `tip`, and notes on
     /// parts of the description that are read differently or not at all. `drive` names what drives the joints, if not
     /// torques.
     ///
     /// # Errors
-    /// A description that cannot be read or is not a serial chain; an unknown drive.
+    /// A description that cannot be read or is not a tree; an unknown drive.
     pub fn model(
         &self,
         file: &Path,
         tip: Option<&str>,
         drive: Option<&str>,
     ) -> Result<(Model, Vec<String>), FileError> {
-        let chain = self.chain(file, tip, drive)?;
-        Ok((model_of(&chain)?, chain.notes))
+        let tree = self.tree(file, tip, drive)?;
+        Ok((model_of(&tree)?, tree.notes))
     }
 
-    /// As [`RobotReader::model`], the chain.
+    /// As [`RobotReader::model`], the tree.
     ///
     /// # Errors
     /// As there.
-    pub fn chain(
+    pub fn tree(
         &self,
         file: &Path,
         tip: Option<&str>,
         drive: Option<&str>,
-    ) -> Result<Chain, FileError> {
-        let chain = (self.read)(file, tip)?;
-        let Some(name) = drive else { return Ok(chain) };
+    ) -> Result<Tree, FileError> {
+        let tree = (self.read)(file, tip)?;
+        let Some(name) = drive else { return Ok(tree) };
         let found = ReadyDrive::find(Library::drives(), name);
         let found = found.map_err(|unknown| FileError::new(file, None, unknown.to_string()));
-        Ok(chain.driven_by(found?))
+        Ok(tree.driven_by(found?))
     }
 }
 
-/// The model of a chain.
+/// The model of a tree.
 ///
 /// # Errors
-/// A chain whose values no model can have.
-pub fn model_of(chain: &Chain) -> Result<Model, FileError> {
-    let name = Path::new(&chain.name);
-    Model::from_text(name, &model_text(chain), Library::built_in().effects())
+/// A tree whose values no model can have.
+pub fn model_of(tree: &Tree) -> Result<Model, FileError> {
+    let name = Path::new(&tree.name);
+    Model::from_text(name, &model_text(tree), Library::built_in().effects())
 }
 
 /// A file to be written.

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use residyn_core::model::chain::{Chain, Drivetrain, Inertia, Joint, Pose, Spring};
+use residyn_core::model::tree::{Drivetrain, Inertia, Joint, Pose, Spring, Tree};
 use residyn_core::model::{Dynamics, Model};
 use residyn_core::sim::Integrator;
 use residyn_formats::{ExportError, ExportModel, find, write_back};
@@ -79,6 +79,7 @@ fn joint() -> impl Strategy<Value = Joint> {
         |(slides, origin, rotation, inertia, drivetrain)| Joint {
             name: String::new(),
             body: String::new(),
+            parent: None,
             slides,
             pose: Pose { rotation, origin },
             reference: 0.0,
@@ -92,15 +93,19 @@ fn joint() -> impl Strategy<Value = Joint> {
     )
 }
 
-/// A chain with this number of joints.
-pub fn chain(joints: RangeInclusive<usize>) -> impl Strategy<Value = Chain> {
-    prop::collection::vec(joint(), joints).prop_map(|mut joints| {
-        for (k, joint) in (1..).zip(&mut joints) {
-            joint.name = format!("joint_{k}");
-            joint.body = format!("body_{k}");
+/// A tree with this number of joints, limb by limb: each joint sits on the one before it, or some steps further up.
+pub fn tree(joints: RangeInclusive<usize>) -> impl Strategy<Value = Tree> {
+    let up = prop_oneof![3 => Just(0), 1 => 1..4_usize];
+    prop::collection::vec((joint(), up), joints).prop_map(|drawn| {
+        let mut joints: Vec<Joint> = Vec::new();
+        for (k, (mut joint, up)) in drawn.into_iter().enumerate() {
+            joint.name = format!("joint_{}", k + 1);
+            joint.body = format!("body_{}", k + 1);
+            joint.parent = (0..up).fold(k.checked_sub(1), |at, _| joints[at?].parent);
+            joints.push(joint);
         }
-        Chain {
-            name: "chain".into(),
+        Tree {
+            name: "tree".into(),
             gravity: Vector3::new(0.0, 0.0, -9.81),
             joints,
             drive: None,
@@ -128,11 +133,11 @@ fn same(found: &Dynamics, wanted: &Dynamics) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// A chain as read back from a format, or why the format does not carry it.
-fn through(format: &str, model: &Model) -> Result<Result<Chain, String>, TestCaseError> {
+/// A tree as read back from a format, or why the format does not carry it.
+fn through(format: &str, model: &Model) -> Result<Result<Tree, String>, TestCaseError> {
     let format = find(format).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("chain").with_extension(format.extension);
+    let path = folder.path().join("tree").with_extension(format.extension);
     let exported = ExportModel::of_system(model, Integrator::RK4, 0.01, serde_json::json!({}));
     match format.write(&exported, &path) {
         Err(error @ ExportError::Model { .. }) => Ok(Err(error.to_string())),
@@ -154,50 +159,50 @@ fn through(format: &str, model: &Model) -> Result<Result<Chain, String>, TestCas
     }
 }
 
-/// The part of a chain that a format carries.
-fn carried(chain: &Chain, format: &str) -> Chain {
-    let mut chain = chain.clone();
-    for drivetrain in chain.joints.iter_mut().map(|joint| &mut joint.drivetrain) {
+/// The part of a tree that a format carries.
+fn carried(tree: &Tree, format: &str) -> Tree {
+    let mut tree = tree.clone();
+    for drivetrain in tree.joints.iter_mut().map(|joint| &mut joint.drivetrain) {
         if format == "urdf" {
             drivetrain.armature = 0.0;
             drivetrain.spring = None;
         }
     }
-    chain
+    tree
 }
 
 proptest! {
     #![proptest_config(cases(40))]
 
     #[test]
-    fn chains_move_alike_when_they_are_read_back(chain in chain(1..=7)) {
+    fn trees_move_alike_when_they_are_read_back(tree in tree(1..=7)) {
         for format in ["urdf", "mjcf"] {
-            let chain = carried(&chain, format);
-            let model = system(&chain);
+            let tree = carried(&tree, format);
+            let model = system(&tree);
             let again = match through(format, &model)? {
                 Ok(again) => again,
                 Err(why) => {
                     // From equations in closed form, only some kinds of mechanism are recovered.
-                    prop_assert!((2..=3).contains(&chain.joints.len()), "{}: {}", format, why);
+                    prop_assert!((2..=3).contains(&tree.joints.len()), "{}: {}", format, why);
                     continue;
                 }
             };
             same(&comparable(&system(&again)), &comparable(&model))?;
-            let damping = |chain: &Chain| -> Vec<f64> {
-                chain.joints.iter().map(|joint| joint.drivetrain.damping).collect()
+            let damping = |tree: &Tree| -> Vec<f64> {
+                tree.joints.iter().map(|joint| joint.drivetrain.damping).collect()
             };
-            prop_assert_eq!(damping(&again), damping(&chain));
+            prop_assert_eq!(damping(&again), damping(&tree));
         }
     }
 
     #[test]
     fn values_come_back_from_a_description_that_they_were_written_into(
-        chain in chain(1..=6),
+        tree in tree(1..=6),
         more in prop::collection::vec(1.0..1.3_f64, 6),
     ) {
         for (format, extension) in [("urdf", "urdf"), ("mjcf", "xml")] {
-            let chain = carried(&chain, format);
-            let Ok(original) = through(format, &system(&chain))? else { continue };
+            let tree = carried(&tree, format);
+            let Ok(original) = through(format, &system(&tree))? else { continue };
             let mut fitted = original.clone();
             for (joint, more) in fitted.joints.iter_mut().zip(&more) {
                 joint.inertia.mass *= more;
@@ -206,8 +211,8 @@ proptest! {
                 joint.drivetrain.damping += more - 1.0;
             }
             let folder = tempfile::tempdir().unwrap();
-            let path = folder.path().join("chain").with_extension(extension);
-            let exported = ExportModel::of_system(&system(&chain), Integrator::RK4, 0.01, serde_json::json!({}));
+            let path = folder.path().join("tree").with_extension(extension);
+            let exported = ExportModel::of_system(&system(&tree), Integrator::RK4, 0.01, serde_json::json!({}));
             find(format).unwrap().write(&exported, &path).unwrap();
             let written = write_back(&system(&fitted), &path, None)
                 .map_err(|error| TestCaseError::fail(error.to_string()))?;
@@ -230,8 +235,8 @@ mod descriptions {
         #![proptest_config(cases(40))]
 
         #[test]
-        fn a_description_holds_every_number(chain in chain(1..=7)) {
-            let model = system(&chain);
+        fn a_description_holds_every_number(tree in tree(1..=7)) {
+            let model = system(&tree);
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("model.json");
             let exported = ExportModel::of_system(&model, Integrator::RK4, 0.01, serde_json::json!({}));

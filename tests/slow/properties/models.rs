@@ -5,10 +5,10 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use residyn_core::data::{Joint, Quantity};
-use residyn_core::model::chain::model_text;
+use residyn_core::model::tree::model_text;
 use residyn_core::model::{Effect, FittedEffect, Library, Model, PerLogValue, Status};
 
-use super::mechanisms::chain;
+use super::mechanisms::tree;
 use super::{cases, same_number};
 
 /// Finite numbers of all sizes.
@@ -479,8 +479,8 @@ proptest! {
     }
 
     #[test]
-    fn models_of_mechanisms_survive_too(chain in chain(1..=5), mut draws in draws()) {
-        let model = read(&model_text(&chain));
+    fn models_of_mechanisms_survive_too(tree in tree(1..=5), mut draws in draws()) {
+        let model = read(&model_text(&tree));
         survives(&model)?;
         survives(&fitted(&model, &mut draws))?;
     }

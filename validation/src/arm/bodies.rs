@@ -37,7 +37,7 @@ impl Bodies {
     pub fn of(model: &Model) -> Option<Self> {
         let values: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
         let mechanism = model.mechanism(&values)?;
-        let link = |joint: &residyn_core::model::chain::Joint| {
+        let link = |joint: &residyn_core::model::tree::Joint| {
             let (pose, of) = (joint.at_zero(), joint.inertia);
             let centre = of.moment / of.mass;
             Link {

@@ -1,9 +1,7 @@
 use thiserror::Error;
 
-use crate::data::Quantity;
 use crate::identify::FitError;
 use crate::limits::FITTED_PARAMETERS;
-use crate::model::Model;
 
 /// Why the loop could not be closed at all.
 #[derive(Debug, Error)]
@@ -19,10 +17,6 @@ pub enum StudyError {
     )]
     NoTorques { model: String },
     #[error(
-        "{model} is driven by commands, so its logs have no torques to compare; compare the motion"
-    )]
-    Commanded { model: String },
-    #[error(
         "the calibration simulates motion, but torques were compared; do not calibrate, or compare the motion"
     )]
     NotOfMotion,
@@ -33,15 +27,4 @@ pub enum StudyError {
     TooManyParameters { model: String, free: usize },
     #[error("{0}")]
     Fit(#[from] FitError),
-}
-
-impl StudyError {
-    /// Why the torques of a model cannot be compared with those of logs.
-    pub(super) fn without_torques(model: &Model) -> Self {
-        let name = model.name.clone();
-        match model.driven_by() {
-            Quantity::Command => Self::Commanded { model: name },
-            _ => Self::NoTorques { model: name },
-        }
-    }
 }

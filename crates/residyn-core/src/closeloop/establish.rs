@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::fitted::Fitted;
+use super::plainer::Unused;
 use super::problem::Problem;
 use super::select::{
     Folds, Losses, Rival, Round, Selected, Trial, candidates, gain, p_of_gains, p_value, rivals,
@@ -57,8 +58,8 @@ pub struct Chosen {
     pub stopped: bool,
     /// Effects that explain the logs as well as one that was chosen.
     pub rivals: Vec<Rival>,
-    /// Why plainer models have taken the place of the one that the search found, in turn.
-    pub replaced: Vec<String>,
+    /// What plainer models, which have taken the place of the one that the search found in turn, do not use.
+    pub unused: Vec<Unused>,
     /// Why there are no effects, if the chosen model could not be fitted.
     pub failure: Option<FitError>,
 }
@@ -90,7 +91,7 @@ pub fn establish(
         rounds: selected.rounds,
         stopped: selected.stopped,
         rivals: Vec::new(),
-        replaced: Vec::new(),
+        unused: Vec::new(),
         failure: None,
     };
     let chosen = match selected.chosen {

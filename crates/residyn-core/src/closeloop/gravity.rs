@@ -56,8 +56,15 @@ pub(super) fn shares_of_gravity(problem: &Problem<'_>) -> Vec<Option<f64>> {
     if problem.error_model != ErrorModel::InverseDynamics {
         return Vec::new();
     }
-    let bodies = problem.declared.with_effects(Vec::new());
-    let of_log = |log| share(&bodies, &Smooth::of(log), &problem.settings.notes);
+    let bodies = problem.declared.without_drive().with_effects(Vec::new());
+    let of_log = |log| {
+        let smooth = Smooth::of(log);
+        let smooth = Smooth {
+            tau: problem.declared.smooth_drive_torques(&smooth),
+            ..smooth
+        };
+        share(&bodies, &smooth, &problem.settings.notes)
+    };
     problem.logs.iter().map(of_log).collect()
 }
 

@@ -3,7 +3,7 @@
 
 use super::problem::Problem;
 use crate::data::statistics::sample_deviation;
-use crate::data::{Smooth, half_width_s};
+use crate::data::{Quantity, Smooth, half_width_s};
 use crate::identify::{Window, initial_state};
 use crate::model::Dynamics;
 use crate::sim::metric::{balance_of, errors_in};
@@ -13,7 +13,8 @@ impl Problem<'_> {
     /// the torques explain far less of the motion: a bench moves the rig, and a sensor measures what that takes. Never
     /// without a first optimum or without torques.
     pub(super) fn is_imposed(&self) -> bool {
-        let left = self.first.as_ref().and_then(|_| self.left_of_torques());
+        let has_torques = self.first.is_some() && self.declared.driven_by() == Quantity::Torque;
+        let left = has_torques.then(|| self.left_of_torques()).flatten();
         let settings = &self.settings.fit;
         left.is_some_and(|torque| {
             torque < settings.imposed_torque_share

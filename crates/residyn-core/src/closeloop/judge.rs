@@ -125,9 +125,8 @@ impl Chosen {
         demote(&mut self.standings, |standing| {
             let formula = standing.effect.effect.entry.formula();
             let of_velocity = formula.is_some_and(|formula| formula.names().contains(&"qd"));
-            let joint = standing.effect.joint;
-            (of_velocity && one_way[joint.index()])
-                .then(|| format!("joint {joint} moves in one direction only"))
+            (of_velocity && one_way[standing.effect.joint.index()])
+                .then(|| "its joint moves in one direction only".into())
         });
     }
 
@@ -227,7 +226,7 @@ fn holds_zero(effect: &FittedEffect) -> bool {
 }
 
 /// Record the status of each added effect in a model.
-fn mark(model: &mut Model, standings: &[Standing]) {
+pub(super) fn mark(model: &mut Model, standings: &[Standing]) {
     let declared = model.effects.len() - standings.len();
     for (effect, standing) in model.effects[declared..].iter_mut().zip(standings) {
         effect.status = Some(standing.status);

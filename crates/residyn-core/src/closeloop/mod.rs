@@ -23,6 +23,7 @@ mod gravity;
 mod imposed;
 mod judge;
 mod learn;
+mod limbs;
 mod loss;
 mod notes;
 mod one_way;

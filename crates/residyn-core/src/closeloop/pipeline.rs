@@ -10,6 +10,7 @@ use super::establish::{Chosen, establish};
 use super::fit::{Declared, fit};
 use super::judge::{Found, judge};
 use super::learn::learn;
+use super::limbs::find_in_limbs;
 use super::loss::Loss;
 use super::notes::noted;
 use super::outcome::{Diagnostics, Effects, Given, Models, Outcome};
@@ -89,6 +90,9 @@ pub fn find<'a>(
     rng: &mut impl Rng,
     watch: &dyn Watch,
 ) -> Result<Found<'a>, StudyError> {
+    if let Some(found) = find_in_limbs(&declared, apart, rng, watch)? {
+        return Ok(found);
+    }
     let mut best = Searched::of(declared, watch);
     if let Some(slower) = best.with_slower_reversals(watch)? {
         best = slower;
@@ -159,7 +163,7 @@ impl<'a> Searched<'a> {
         let Declared { problem, fitted } = &self.declared;
         let Plainer {
             fitted: plain,
-            reason,
+            unused,
         } = plainer(problem, fitted, &self.chosen, apart)?;
         let selected = Selected {
             chosen: Ok(Trial::of(problem, plain)),
@@ -167,7 +171,7 @@ impl<'a> Searched<'a> {
             stopped: self.chosen.stopped,
         };
         let chosen = Chosen {
-            replaced: [self.chosen.replaced.as_slice(), &[reason]].concat(),
+            unused: [self.chosen.unused.as_slice(), &[unused]].concat(),
             ..establish(problem, fitted, selected, watch)
         };
         let declared = self.declared.clone();

@@ -9,16 +9,36 @@ use super::fitted::Fitted;
 use super::problem::Problem;
 use crate::data::Log;
 use crate::identify::Values;
+use crate::model::FittedEffect;
 use crate::sim::metric::{errors_in, windows};
 
 /// Most groups of logs that are left out in turn.
 const GROUPS: usize = 4;
 
-/// A plainer model that takes the place of the chosen one, and why.
+/// A plainer model that takes the place of the chosen one.
 pub(super) struct Plainer {
     pub fitted: Fitted,
+    pub unused: Unused,
+}
+
+/// What a plainer model does not use, and why.
+#[derive(Debug, Clone)]
+pub struct Unused {
+    /// One effect, or all that the search found.
+    pub(super) effect: Option<FittedEffect>,
     /// The end of a sentence.
-    pub reason: String,
+    pub(super) why: String,
+}
+
+impl Unused {
+    /// As a sentence.
+    pub fn text(&self) -> String {
+        let why = &self.why;
+        match &self.effect {
+            Some(effect) => format!("{} is not used: {why}", effect.label()),
+            None => format!("the effects that the search found are not used: {why}"),
+        }
+    }
 }
 
 /// The model without one of the chosen effects, the model with the usual friction, or the declared one, if it predicts
@@ -37,17 +57,19 @@ pub(super) fn plainer(
     if is_harmful(problem, declared, after, apart) {
         return Some(Plainer {
             fitted: declared.clone(),
-            reason: "the effects that the search found are not used: they raise the error on the logs set apart".into(),
+            unused: Unused {
+                effect: None,
+                why: "they raise the error on the logs set apart".into(),
+            },
         });
     }
     let settings = &problem.settings.select;
     let least = LeftOut::of(problem, after, apart);
     let usual = problem.with_usual_friction();
     let usual = usual.filter(|usual| !has_same_effects(usual, after));
-    let all = "the effects that the search found are";
     let whole = |fitted, of| Other {
         fitted,
-        unused: all.to_owned(),
+        unused: None,
         of,
         least: settings.plainer_gain,
     };
@@ -62,7 +84,7 @@ pub(super) fn plainer(
         let less = error_apart(problem, without, apart);
         let other = || Other {
             fitted: without,
-            unused: format!("{} is", standing.effect.label()),
+            unused: Some(&standing.effect),
             of: "without it",
             // An effect that does not help on left-out blocks either has nothing for it.
             least: match standing.gain > 0.0 {
@@ -83,12 +105,14 @@ pub(super) fn plainer(
     let (best, gain) = better.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
     Some(Plainer {
         fitted: best.fitted.clone(),
-        reason: format!(
-            "{} not used: on whole logs that the fit had not seen, the error {} is lower by {:.0} %",
-            best.unused,
-            best.of,
-            100.0 * (1.0 - (-gain).exp())
-        ),
+        unused: Unused {
+            effect: best.unused.cloned(),
+            why: format!(
+                "on whole logs that the fit had not seen, the error {} is lower by {:.0} %",
+                best.of,
+                100.0 * (1.0 - (-gain).exp())
+            ),
+        },
     })
 }
 
@@ -100,10 +124,10 @@ fn is_harmful(problem: &Problem<'_>, declared: &Fitted, chosen: &Fitted, apart: 
         && of(chosen).is_worse_than(&of(declared), problem.settings)
 }
 
-/// A plainer model than the chosen one, and how a sentence names what it does not use, and its error.
+/// A plainer model than the chosen one, the effect that it does not use, if it is one, and how a sentence names its error.
 struct Other<'a> {
     fitted: &'a Fitted,
-    unused: String,
+    unused: Option<&'a FittedEffect>,
     of: &'static str,
     /// The share by which its error has to be lower.
     least: f64,

@@ -110,7 +110,9 @@ impl Prepared<'_> {
         if self.error_model == Some(ErrorModel::InverseDynamics)
             && self.model.torque_balance().is_none()
         {
-            return Err(StudyError::without_torques(&self.model));
+            return Err(StudyError::NoTorques {
+                model: self.model.name.clone(),
+            });
         }
         Ok(())
     }

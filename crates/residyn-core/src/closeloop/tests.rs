@@ -267,7 +267,7 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
         rounds: Vec::new(),
         stopped: false,
         rivals: Vec::new(),
-        replaced: Vec::new(),
+        unused: Vec::new(),
         failure: None,
     };
     let found = findings(&problem, &chosen, &refined, &scorer);

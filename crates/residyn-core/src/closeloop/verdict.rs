@@ -2,6 +2,7 @@ use super::diagnostics::{UNKNOWN, Unexplained};
 use super::error_model::ErrorModel;
 use super::gravity::against_gravity;
 use super::judge::Found;
+use super::plainer::Unused;
 use super::problem::Problem;
 use super::refine::Refined;
 use super::score::Errors;
@@ -39,7 +40,7 @@ pub(super) fn verdict(
     let reasons = far
         .into_iter()
         .chain([reason])
-        .chain(found.chosen.replaced.clone());
+        .chain(found.chosen.unused.iter().map(Unused::text));
     (verdict, reasons.collect::<Vec<_>>().join("; "))
 }
 
@@ -118,9 +119,12 @@ const FAR: f64 = 100.0;
 
 /// The declared parameters that are fitted far from their declared values, as a reason to distrust the answer.
 fn far_from_declared(problem: &Problem<'_>, refined: &Refined<'_>) -> Option<String> {
-    let declared = problem.declared.parameters.iter();
+    // Moments and products of inertia have no size of their own: bodies stay physical.
+    let of_bodies = problem.declared.inertias().concat();
+    let declared = problem.declared.parameters.iter().enumerate();
+    let declared = declared.filter(|(k, p)| p.bounds[0] >= 0.0 || !of_bodies.contains(k));
     let far = declared
-        .zip(&refined.after.model.parameters)
+        .map(|(k, declared)| (declared, &refined.after.model.parameters[k]))
         .filter(|(declared, fitted)| {
             let ratio = (fitted.value / declared.value).abs();
             // Nothing is odd about a moment or an offset that is nearly zero.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::column::{Column, Quantity};
 use super::error::{LogError, Place};
-use super::joint::Joint;
+use super::joint::{Joint, of_joints};
 use super::torque_column::TorqueColumn;
 use crate::expr::listed;
 
@@ -60,6 +60,19 @@ impl Columns {
             tau: numbered(driven_by.key(), joints),
             driven_by,
             ..Self::default()
+        }
+    }
+
+    /// The columns of these joints alone.
+    #[must_use]
+    pub(crate) fn of_joints(&self, joints: &[Joint]) -> Self {
+        Self {
+            q: of_joints(&self.q, joints),
+            qd: self.qd.as_ref().map(|qd| of_joints(qd, joints)),
+            tau: of_joints(&self.tau, joints),
+            joint_names: of_joints(&self.joint_names, joints),
+            slides: of_joints(&self.slides, joints),
+            ..self.clone()
         }
     }
 

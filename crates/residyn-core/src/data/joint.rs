@@ -63,6 +63,12 @@ impl Joint {
     }
 }
 
+/// The entries of a list that belong to these joints; none of an empty list.
+pub(crate) fn of_joints<T: Clone>(all: &[T], joints: &[Joint]) -> Vec<T> {
+    let own = joints.iter().filter_map(|joint| all.get(joint.index()));
+    own.cloned().collect()
+}
+
 impl fmt::Display for Joint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.number().fmt(f)

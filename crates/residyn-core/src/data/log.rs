@@ -12,6 +12,7 @@ use super::column::Quantity;
 use super::columns::Columns;
 use super::error::{CellFault, LogError, Place};
 use super::instant::SAME_S;
+use super::joint::{Joint, of_joints};
 use super::jumps::{bridge, rows_that_jump};
 use super::signal::differences;
 use super::statistics::median_of;
@@ -146,6 +147,18 @@ impl Log {
     pub fn is_whole(&self, rows: RangeInclusive<usize>) -> bool {
         let first = self.filled.partition_point(|row| row < rows.start());
         self.filled.get(first).is_none_or(|row| row > rows.end())
+    }
+
+    /// The channels of these joints alone.
+    #[must_use]
+    pub(crate) fn of_joints(&self, joints: &[Joint]) -> Self {
+        Self {
+            q: of_joints(&self.q, joints),
+            qd: of_joints(&self.qd, joints),
+            tau: of_joints(&self.tau, joints),
+            masked: of_joints(&self.masked, joints),
+            ..self.clone()
+        }
     }
 
     /// The log as fits read it: readings that jump or repeat those before are masked, and rows that the logger dropped

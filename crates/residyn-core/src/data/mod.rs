@@ -48,6 +48,7 @@ pub(crate) use dropped::is_gap;
 pub use error::{CellFault, LogError, Place};
 pub(crate) use instant::SAME_S;
 pub use instant::{row_after, row_from};
+pub(crate) use joint::of_joints;
 pub use joint::{Joint, JointError};
 pub use leave_out::{LeaveOut, LeaveOutError};
 pub(crate) use local_cubic::rows_around;

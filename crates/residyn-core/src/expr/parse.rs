@@ -62,6 +62,23 @@ impl Formula {
         names
     }
 
+    /// The formula with other names, where there is one.
+    ///
+    /// # Panics
+    /// If what is given is not a name.
+    #[must_use]
+    pub fn renamed(&self, other: &dyn Fn(&str) -> Option<String>) -> Self {
+        let mut places = Vec::new();
+        self.root.add_places(&mut places);
+        let mut text = self.text.clone();
+        for (name, span) in places.iter().rev() {
+            if let Some(other) = other(name) {
+                text.replace_range(span.clone(), &other);
+            }
+        }
+        parse(&text).expect("names can take the place of names")
+    }
+
     /// Whether the formula calls this function.
     pub fn calls(&self, function: &str) -> bool {
         self.root.calls(function)
@@ -88,6 +105,16 @@ impl Term {
                 .operands()
                 .iter()
                 .any(|operand| operand.calls(function))
+    }
+
+    /// As [`Term::add_names`], each with its place in the text.
+    fn add_places<'t>(&'t self, names: &mut Vec<(&'t str, Range<usize>)>) {
+        if let Kind::Name(name) = &self.kind {
+            names.push((name, self.span.clone()));
+        }
+        for operand in self.kind.operands() {
+            operand.add_places(names);
+        }
     }
 
     fn add_names<'t>(&'t self, names: &mut Vec<&'t str>) {

@@ -13,7 +13,7 @@ use super::outcome::Fit;
 use super::sensitivity::{LANES, Local, Tangent};
 use super::values::{Column, Values};
 use crate::lanes::Row;
-use crate::model::chain::PARTS;
+use crate::model::tree::PARTS;
 use crate::model::{Dynamics, Model, Parameter};
 
 /// A body's parameter together with the parameters that affect the torques of these logs in the same way.

@@ -1,7 +1,7 @@
 use super::normal_equations::WindowTerms;
 use super::values::{Column, Values};
 use crate::model::Model;
-use crate::model::chain::{Divergence, PARTS};
+use crate::model::tree::{Divergence, PARTS};
 
 /// What is known of a model's values apart from the logs: that the declared ones are of the right size. Of all values
 /// with which a model explains the logs equally well, the fit finds those nearest to the declared ones.

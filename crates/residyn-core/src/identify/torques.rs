@@ -5,7 +5,7 @@ use super::solver::Solver;
 use super::values::free_parameters;
 use crate::data::Log;
 use crate::model::Model;
-use crate::model::chain::physical_parts;
+use crate::model::tree::physical_parts;
 use crate::sim::cut;
 
 /// Length of the windows that are left out or resampled as one, s.

@@ -46,10 +46,10 @@ impl Model {
 
     /// The torque balance, compiled like [`Model::dynamics`]: the program's outputs are, for each joint, the torque
     /// (N m, or N) that a motion needs beyond what acts after all effects; zero if the model is right. If the acting
-    /// torque does not change one to one with the command, the difference is expressed as a command, to first order.
-    /// Its inputs are those of [`Dynamics`] with the accelerations `qdd1..qddn` before the parameters. `None` for a
-    /// model that gives accelerations, which has no torques, and for one that is driven by commands, since its logs
-    /// hold no torques.
+    /// torque does not change one to one with the commanded one, or with the one that the drive's law asks for, the
+    /// difference is expressed in terms of that, to first order. Its inputs are those of [`Dynamics`] with the
+    /// accelerations `qdd1..qddn` before the parameters. `None` for a model that gives accelerations, which has no
+    /// torques.
     pub fn torque_balance(&self) -> Option<Dynamics> {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &self.effects, &sign);
@@ -81,11 +81,9 @@ impl Model {
     }
 
     fn balanced(&self, mut assembly: Assembly<'_>, qdd: &[Node]) -> Option<Dynamics> {
-        if self.equations.drive.is_some() {
-            return None;
-        }
-        assembly.apply_sensors();
+        assembly.apply_drive();
         let commanded = assembly.tau.clone();
+        assembly.apply_sensors();
         assembly.apply_torque_effects();
         assembly.apply_forces();
         let needed = assembly.torques(qdd)?;
@@ -278,13 +276,17 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Mass and position of the load at the tip, if there is one.
-    fn payload(&mut self) -> Option<[Node; 4]> {
+    /// Mass and position of the loads at tips, each with the joint that moves it.
+    fn payloads(&mut self) -> Vec<(Joint, [Node; 4])> {
         let is_load = |effect: &Effect| matches!(effect.entry, Entry::Payload(_));
-        let (index, _, mass) = self.entries(is_load).pop()?;
-        let mass = self.effect_node(index, mass);
-        let [x, y, z] = PLACE.map(|name| self.parameter(index, name));
-        Some([mass, x, y, z])
+        let loads = self.entries(is_load).into_iter();
+        loads
+            .map(|(index, joint, mass)| {
+                let mass = self.effect_node(index, mass);
+                let [x, y, z] = PLACE.map(|name| self.parameter(index, name));
+                (joint, [mass, x, y, z])
+            })
+            .collect()
     }
 
     /// A parameter that the effect needs by name.
@@ -375,10 +377,10 @@ impl<'a> Assembly<'a> {
                 let rows = mass.iter().map(|row| self.lowered(&scope, row));
                 (rows.collect(), self.lowered(&scope, bias))
             }
-            Motion::Chain(bodies) => {
+            Motion::Tree(bodies) => {
                 let still = vec![self.graph.constant(0.0); self.system.joints];
-                let payload = self.payload();
-                let mut links = bodies.loaded(&mut self.graph, &scope, payload);
+                let payloads = self.payloads();
+                let mut links = bodies.loaded(&mut self.graph, &scope, &payloads);
                 (links.mass(), links.torques(&self.qd, &still))
             }
         };
@@ -389,12 +391,12 @@ impl<'a> Assembly<'a> {
     /// The torques that these accelerations need.
     fn torques(&mut self, qdd: &[Node]) -> Option<Vec<Node>> {
         let (matrix, bias) = match &self.system.equations.motion {
-            Motion::Chain(bodies) => {
+            Motion::Tree(bodies) => {
                 let scope = self.declared_scope();
                 let none = vec![self.graph.constant(0.0); self.system.joints];
                 let mut matrix = vec![none; self.system.joints];
-                let payload = self.payload();
-                let mut links = bodies.loaded(&mut self.graph, &scope, payload);
+                let payloads = self.payloads();
+                let mut links = bodies.loaded(&mut self.graph, &scope, &payloads);
                 let bias = links.torques(&self.qd, qdd);
                 self.add_inertia(&mut matrix);
                 (matrix, bias)

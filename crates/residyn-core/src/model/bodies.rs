@@ -1,12 +1,12 @@
 use nalgebra::Vector3;
 
 use super::assemble::lower;
-use super::chain::{Body, Inertia, Links, Place, Recovered};
 use super::reader::Located;
+use super::tree::{Body, Inertia, Links, Place, Recovered};
 use crate::data::Joint;
 use crate::expr::{Formula, Graph, Node, Scope};
 
-/// A serial chain of bodies, whose inertia is given by formulas in the parameters.
+/// A tree of bodies, whose inertia is given by formulas in the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bodies {
     /// Acceleration, m/s^2, in the axes of the world.
@@ -51,6 +51,25 @@ impl Bodies {
         names.filter_map(|name| scope.get(&name)).collect()
     }
 
+    /// Whether a joint carries a link that another one moves.
+    pub fn carries(&self, joint: Joint, other: Joint) -> bool {
+        let mover = |link: usize| self.places[link].joint;
+        let mut others = self.places.iter().filter(|place| place.joint == other);
+        others.any(|place| place.parent.is_some_and(|parent| mover(parent) == joint))
+    }
+
+    /// Whether a joint moves a link on the base.
+    pub fn is_on_base(&self, joint: Joint) -> bool {
+        let mut own = self.places.iter().filter(|place| place.joint == joint);
+        own.any(|place| place.parent.is_none())
+    }
+
+    /// Whether a joint moves the last link of a limb.
+    pub fn is_tip(&self, joint: Joint) -> bool {
+        let mut others = Joint::all(self.joints()).filter(|other| *other != joint);
+        !others.any(|other| self.carries(joint, other))
+    }
+
     fn joints(&self) -> usize {
         let numbers = self.places.iter().map(|place| place.joint.index() + 1);
         numbers.max().unwrap_or(0)
@@ -64,32 +83,34 @@ impl Bodies {
             .collect()
     }
 
-    /// The chain with these numbers in place of [`Bodies::constants`].
+    /// The tree with these numbers in place of [`Bodies::constants`].
     pub fn mechanism(&self, numbers: &[f64]) -> Recovered {
         let (gravity, parts) = numbers.split_at(self.gravity.len());
         let parts = parts.chunks_exact(parts.len() / self.bodies.len());
         let bodies: Vec<Inertia> = parts.map(Inertia::of_parts).collect();
-        Recovered::of_chain(&self.places, &bodies, Vector3::from_column_slice(gravity))
+        Recovered::of_tree(&self.places, &bodies, Vector3::from_column_slice(gravity))
     }
 
     /// The links at the angles that `scope` calls `q1..qn`.
     pub fn links<'g>(&self, graph: &'g mut Graph, scope: &Scope) -> Links<'g> {
-        self.loaded(graph, scope, None)
+        self.loaded(graph, scope, &[])
     }
 
-    /// As above, with a point mass on the last body: its mass (kg) and its position in that body's frame (m).
+    /// As above, with point masses on the bodies that these joints move: mass (kg) and position in the body's frame (m).
     pub fn loaded<'g>(
         &self,
         graph: &'g mut Graph,
         scope: &Scope,
-        payload: Option<[Node; 4]>,
+        payloads: &[(Joint, [Node; 4])],
     ) -> Links<'g> {
         let gravity = std::array::from_fn(|a| lower(scope, graph, &self.gravity[a].value));
         let body =
             |body: &Body<Located<Formula>>| body.map(|formula| lower(scope, graph, &formula.value));
         let mut bodies: Vec<Body<Node>> = self.bodies.iter().map(body).collect();
-        if let (Some(payload), Some(last)) = (payload, bodies.last_mut()) {
-            *last = with_point(graph, last, payload);
+        for (joint, payload) in payloads {
+            let link = self.places.iter().rposition(|place| place.joint == *joint);
+            let link = link.expect("each joint moves a link");
+            bodies[link] = with_point(graph, &bodies[link], *payload);
         }
         let q = self.named(scope, "q");
         Links::at(graph, &self.places, &bodies, gravity, &q)

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::assemble::lower;
 use super::reader::{FileError, Located, Section};
 use super::system::{Equations, Model};
-use crate::data::{Joint, Log, Quantity};
+use crate::data::{Joint, Log, Quantity, Smooth};
 use crate::expr::{Formula, Graph, Node, Program, Scope};
 use crate::lanes::Row;
 
@@ -36,6 +36,32 @@ impl Drive {
         &self.0
     }
 
+    /// The formulas, each with its joint.
+    pub fn formulas_by_joint(&self) -> impl Iterator<Item = (Joint, &Located<Formula>)> {
+        Joint::all(self.0.len()).zip(&self.0)
+    }
+
+    /// The drives of these joints alone, in the names of joints that are numbered from 1.
+    pub fn limb(&self, joints: &[Joint]) -> Self {
+        let renamed = |name: &str| {
+            let stems = ["q", "qd", Quantity::Command.key()];
+            let mut named = stems.iter().flat_map(|stem| {
+                let pair =
+                    move |(k, joint): (usize, &Joint)| (joint.name(stem), Joint::at(k).name(stem));
+                joints.iter().enumerate().map(pair)
+            });
+            named.find(|(whole, _)| whole == name).map(|(_, own)| own)
+        };
+        let own = joints.iter().map(|joint| {
+            let Located { value, at } = &self.0[*joint];
+            Located {
+                value: value.renamed(&renamed),
+                at: *at,
+            }
+        });
+        Self(own.collect())
+    }
+
     /// The torques, in a scope that has the names they may mention.
     pub fn torques(&self, graph: &mut Graph, scope: &Scope) -> Vec<Node> {
         let formulas = self.0.iter();
@@ -62,16 +88,30 @@ impl Model {
     /// The drives' torques along a log (`[joint][row]`, N m or N), at the declared values, before any effect; the log's
     /// own torques if it holds torques.
     pub fn drive_torques(&self, log: &Log) -> Vec<Vec<f64>> {
+        let channels = log.q.iter().chain(&log.qd).chain(&log.tau);
+        let channels: Vec<&[f64]> = channels.chain([&log.time]).map(Vec::as_slice).collect();
+        self.drive_torques_along(&channels)
+    }
+
+    /// The same along a smoothed log.
+    pub fn smooth_drive_torques(&self, smooth: &Smooth) -> Vec<Vec<f64>> {
+        let channels = smooth.q.iter().chain(&smooth.qd).chain(&smooth.tau);
+        let channels = channels.chain([&smooth.time]).map(Vec::as_slice);
+        self.drive_torques_along(&channels.collect::<Vec<_>>())
+    }
+
+    /// The same along positions, velocities, commands and time.
+    fn drive_torques_along(&self, channels: &[&[f64]]) -> Vec<Vec<f64>> {
         let Some(program) = self.drive_program() else {
-            return log.tau.clone();
+            let torques = &channels[2 * self.joints..3 * self.joints];
+            return torques.iter().map(|torques| torques.to_vec()).collect();
         };
-        let mut torques = vec![Vec::with_capacity(log.rows()); self.joints];
-        let channels = || (log.q.iter().chain(&log.qd).chain(&log.tau)).chain([&log.time]);
-        let moving = channels().count();
+        let rows = channels.last().map_or(0, |time| time.len());
+        let mut torques = vec![Vec::with_capacity(rows); self.joints];
         let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
-        let mut tape = program.tape_at::<f64, 1>(moving, &values);
-        for row in 0..log.rows() {
-            for (slot, channel) in tape.moving().iter_mut().zip(channels()) {
+        let mut tape = program.tape_at::<f64, 1>(channels.len(), &values);
+        for row in 0..rows {
+            for (slot, channel) in tape.moving().iter_mut().zip(channels) {
                 *slot = Row([channel[row]]);
             }
             tape.run();

@@ -19,14 +19,14 @@ pub enum ModelError {
         /// A similar known name, as the end of a sentence; empty without one.
         near: String,
     },
-    /// The effect acts only on a first joint that turns.
-    #[error("`{effect}` acts on the first joint only, which must be revolute")]
+    /// The effect acts only on a joint on the base that turns.
+    #[error("`{effect}` acts on a joint on the base only, which must be revolute")]
     FirstJointOnly { effect: String },
     /// The effect repeats with each turn of its joint.
     #[error("`{effect}` acts on joints that turn only: it repeats with each turn")]
     TurningJointsOnly { effect: String },
-    /// The effect acts only on the last joint of a chain of bodies.
-    #[error("`{effect}` acts only on the last joint of a chain of bodies")]
+    /// The effect acts only on the last joint of a limb of a tree of bodies.
+    #[error("`{effect}` acts only on the last joint of a limb, in a model made of bodies")]
     LastJointOnly { effect: String },
     /// The effect acts only on two neighbouring joints of one kind.
     #[error("`{effect}` acts on two consecutive joints that are both revolute or both prismatic")]

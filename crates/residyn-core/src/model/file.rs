@@ -11,7 +11,7 @@ use super::input_layout::InputLayout;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Energy, Equations, Model, Motion, Places};
 use super::tables::{ChainTable, EnergyTable, ModelFile};
-use super::{chain_in_file, effects_in_file, sections};
+use super::{effects_in_file, sections, tree_in_file};
 use crate::data::{Columns, Joint, Quantity};
 use crate::expr::{Formula, Graph, Scope, parse};
 
@@ -108,7 +108,7 @@ impl Model {
     fn check_formulas(&self, document: &Document) -> Result<(), FileError> {
         let mut graph = Graph::new();
         let mut names = self.input_names();
-        if matches!(self.equations.motion, Motion::Chain(_)) {
+        if matches!(self.equations.motion, Motion::Tree(_)) {
             // The inertia of a body does not change as it moves.
             names.drain(..InputLayout::of(self.joints).parameters());
         }
@@ -185,6 +185,6 @@ fn motion(
     if let Some(dynamics) = top.read::<Option<Section<'_>>>("dynamics")? {
         dynamics.only(&["let"])?;
     }
-    let bodies = chain_in_file::bodies(chain, prismatic)?;
-    Ok(Motion::Chain(Box::new(bodies)))
+    let bodies = tree_in_file::bodies(chain, prismatic)?;
+    Ok(Motion::Tree(Box::new(bodies)))
 }

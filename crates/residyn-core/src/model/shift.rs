@@ -51,7 +51,7 @@ impl Model {
                 let mut row = mass[*joint].iter().chain([&bias[*joint]]);
                 row.any(enters)
             }),
-            Motion::Chain(bodies) => bodies.outermost(enters),
+            Motion::Tree(bodies) => bodies.outermost(enters),
         }
     }
 }

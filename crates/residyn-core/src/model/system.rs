@@ -3,13 +3,13 @@ use std::sync::Arc;
 
 use super::assemble::lower;
 use super::bodies::Bodies;
-use super::chain::{Body, Recovered};
 use super::drive::Drive;
 use super::dynamics::{Dynamics, Parameter, PerLogValue};
 use super::effect::{ActsOn, Effect, Entry, Measure};
 use super::error::ModelError;
 use super::fitted::FittedEffect;
 use super::reader::Located;
+use super::tree::{Body, Recovered};
 use crate::data::{Columns, Joint, Log, LogError, Quantity};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
@@ -27,7 +27,7 @@ pub(super) enum Motion {
         bias: Vec<Located<Formula>>,
     },
     /// The same, for a chain of bodies.
-    Chain(Box<Bodies>),
+    Tree(Box<Bodies>),
 }
 
 /// The balance of energy and work: d(total)/dt = power along every motion.
@@ -267,7 +267,7 @@ impl Model {
         let name = || effect.name.clone();
         let slides = self.prismatic[joint];
         match effect.acts_on {
-            ActsOn::First if slides || joint.index() > 0 => {
+            ActsOn::First if slides || !self.is_on_base(joint) => {
                 return Err(ModelError::FirstJointOnly { effect: name() });
             }
             ActsOn::Turning if slides => {
@@ -292,15 +292,27 @@ impl Model {
         }
     }
 
-    /// Whether the joint moves the tip of a chain of bodies.
-    fn carries_at(&self, joint: Joint) -> bool {
-        matches!(self.equations.motion, Motion::Chain(_)) && !joint.next().is_of(self.joints)
+    /// Whether no joint carries this one.
+    fn is_on_base(&self, joint: Joint) -> bool {
+        match &self.equations.motion {
+            Motion::Tree(bodies) => bodies.is_on_base(joint),
+            _ => joint.index() == 0,
+        }
     }
 
-    /// Whether a joint and the next one have coordinates of one kind.
+    /// Whether the joint moves the tip of a tree of bodies.
+    fn carries_at(&self, joint: Joint) -> bool {
+        matches!(&self.equations.motion, Motion::Tree(bodies) if bodies.is_tip(joint))
+    }
+
+    /// Whether a joint carries the next one, as far as the equations say, and both have coordinates of one kind.
     fn couples(&self, joint: Joint) -> bool {
         let next = joint.next();
-        next.is_of(self.joints) && self.prismatic[joint] == self.prismatic[next]
+        let is_carried = match &self.equations.motion {
+            Motion::Tree(bodies) => next.is_of(self.joints) && bodies.carries(joint, next),
+            _ => next.is_of(self.joints),
+        };
+        is_carried && self.prismatic[joint] == self.prismatic[next]
     }
 
     /// Whether an effect with its values can join `present` ones.
@@ -373,7 +385,7 @@ impl Model {
                 let mut lower = |formula: &Located<_>| lower(&scope, &mut graph, &formula.value);
                 (lower(total), lower(power))
             }
-            (None, Motion::Chain(bodies)) => bodies.energy(&mut graph, &scope),
+            (None, Motion::Tree(bodies)) => bodies.energy(&mut graph, &scope),
             _ => return None,
         };
         let one = graph.constant(1.0);
@@ -386,7 +398,7 @@ impl Model {
     /// The parameters of each body of a chain whose ten parts are plain parameters: mass, first moments, and xx, xy,
     /// xz, yy, yz, zz of the tensor.
     pub fn inertias(&self) -> Vec<[usize; 10]> {
-        let Motion::Chain(bodies) = &self.equations.motion else {
+        let Motion::Tree(bodies) = &self.equations.motion else {
             return Vec::new();
         };
         let place = |formula: &Located<Formula>| {
@@ -402,7 +414,7 @@ impl Model {
 
     /// The bodies that the file describes, if it describes a chain, at these values of the declared parameters.
     pub fn mechanism(&self, values: &[f64]) -> Option<Recovered> {
-        let Motion::Chain(bodies) = &self.equations.motion else {
+        let Motion::Tree(bodies) = &self.equations.motion else {
             return None;
         };
         let mut graph = Graph::new();
@@ -420,7 +432,7 @@ impl Motion {
         match self {
             Self::Accelerations(formulas) => Box::new(formulas.iter()),
             Self::MassAndBias { mass, bias } => Box::new(mass.iter().flatten().chain(bias)),
-            Self::Chain(bodies) => Box::new(bodies.formulas()),
+            Self::Tree(bodies) => Box::new(bodies.formulas()),
         }
     }
 }

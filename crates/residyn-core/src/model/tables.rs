@@ -100,6 +100,7 @@ tables! {
 
     struct LinkTable<'a> {
         joint: usize,
+        parent: Option<usize>,
         ratio: Option<f64>,
         offset: Option<f64>,
         slides: Option<bool>,

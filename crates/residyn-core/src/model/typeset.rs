@@ -45,7 +45,7 @@ impl Model {
                     matrix(&column("tau"))
                 ));
             }
-            Motion::Chain(_) => lines.push(format!(
+            Motion::Tree(_) => lines.push(format!(
                 "M(q)\\,{} + h(q, \\dot q) &= {}",
                 matrix(&column("qdd")),
                 matrix(&column("tau"))

@@ -8,7 +8,7 @@ use super::classes::Classes;
 use crate::robot::element::Element;
 use crate::xml::{Source, elements, named};
 use residyn_core::model::FileError;
-use residyn_core::model::chain::Servo;
+use residyn_core::model::tree::Servo;
 
 /// What drives a joint.
 #[derive(Debug, Clone, Copy, Default)]

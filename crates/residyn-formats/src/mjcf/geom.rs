@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::orientation::{Angles, from_z_to};
 use crate::robot::element::Element;
 use residyn_core::model::FileError;
-use residyn_core::model::chain::{Inertia, Pose};
+use residyn_core::model::tree::{Inertia, Pose};
 
 /// Default density, kg/m^3.
 const DENSITY: f64 = 1000.0;

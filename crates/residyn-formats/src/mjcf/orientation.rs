@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::robot::element::Element;
 use residyn_core::model::FileError;
-use residyn_core::model::chain::turn;
+use residyn_core::model::tree::turn;
 
 /// Conventions for angles.
 pub(super) struct Angles {

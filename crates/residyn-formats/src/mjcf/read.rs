@@ -1,4 +1,4 @@
-//! Reads a serial mechanism.
+//! Reads a mechanism.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -14,25 +14,25 @@ use crate::robot::element::Element;
 use crate::robot::tree::{self, Body, Hinge, Mimics};
 use crate::xml::{self, Source, elements, named};
 use residyn_core::model::FileError;
-use residyn_core::model::chain::{Chain, Drivetrain, Inertia, Pose, Spring};
+use residyn_core::model::tree::{Drivetrain, Inertia, Pose, Spring, Tree};
 
-/// Read the serial chain from the world of an MJCF file to the body `tip`, by default to the end of the longest branch.
+/// Read the tree of an MJCF file, or its branch from the world to the body `tip`. A floating base is fixed, with a note.
 ///
 /// # Errors
-/// An unreadable file, invalid XML, anything but a serial chain of hinge and slide joints, or data outside of the file,
+/// An unreadable file, invalid XML, anything but a tree of hinge and slide joints, or data outside of the file,
 /// such as meshes: with line, column and remedy.
-pub fn read_mjcf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
+pub fn read_mjcf(path: &Path, tip: Option<&str>) -> Result<Tree, FileError> {
     let text = xml::text(path)?;
     let source = Source::new(path, &text)?;
     let reader = Reader::new(&source)?;
     let gravity = reader.gravity()?;
-    let joints = tree::chain(&source, &reader.world()?, tip)?;
+    let joints = tree::joints(&source, &reader.world()?, tip)?;
     reader.note_the_rest()?;
     let name = reader
         .root
         .attribute("model")
         .map_or_else(|| source.stem(), tree::plain);
-    Ok(Chain {
+    Ok(Tree {
         name,
         gravity,
         joints,
@@ -53,6 +53,8 @@ const JOINT: &str = "\
     damping frictionloss user";
 /// Attributes of a body that are read here or have no effect.
 const BODY: &str = "name childclass pos quat axisangle euler xyaxes zaxis mocap user sleep";
+/// The type of a joint with which a body floats.
+const FREE: &str = "free";
 /// Flags that switch off joint forces.
 const FORCES: &[&str] = &["passive", "spring", "damper", "frictionloss"];
 
@@ -192,7 +194,8 @@ impl<'s, 'x> Reader<'s, 'x> {
         let own = self.source.element(node);
         own.note_others(BODY);
         let name = node.attribute("name").unwrap_or("body").to_owned();
-        let joints = named(node, "joint").enumerate().map(|(k, joint)| {
+        let moving = named(node, "joint").filter(|joint| joint.attribute("type") != Some(FREE));
+        let joints = moving.enumerate().map(|(k, joint)| {
             let fallback = format!("{name}_joint{}", k + 1);
             self.hinge(&self.classes.element(joint, class, &["joint"])?, &fallback)
         });
@@ -211,14 +214,20 @@ impl<'s, 'x> Reader<'s, 'x> {
 
     fn check_parts(&self, body: Node<'s, 'x>) -> Result<(), FileError> {
         for part in elements(body) {
-            let remedy = match part.tag_name().name() {
+            let name = part.tag_name().name();
+            if name == "freejoint" || name == "joint" && part.attribute("type") == Some(FREE) {
+                let note =
+                    "this body is free to move in the file; it is fixed where the file draws it";
+                self.source.note(part, note.to_owned());
+                continue;
+            }
+            let remedy = match name {
                 "inertial" | "joint" | "geom" | "body" | "site" | "camera" | "light" => continue,
-                "freejoint" => "a floating base; remove it, which fixes the base",
                 _ => {
                     "which is not read; save the compiled model with MuJoCo's mj_saveLastXML, or remove it"
                 }
             };
-            let message = format!("<{}> in a body: {remedy}", part.tag_name().name());
+            let message = format!("<{name}> in a body: {remedy}");
             return Err(self.source.error(part, message));
         }
         Ok(())

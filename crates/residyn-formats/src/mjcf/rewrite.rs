@@ -10,7 +10,7 @@ use crate::robot::mechanism::numbers;
 use crate::robot::write_back::{Change, body, is_some};
 use crate::xml::{Source, named};
 use residyn_core::model::FileError;
-use residyn_core::model::chain::{Drivetrain, Inertia};
+use residyn_core::model::tree::{Drivetrain, Inertia};
 
 /// Add the edits that make these changes to the file.
 ///

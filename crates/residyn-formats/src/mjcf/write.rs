@@ -11,11 +11,11 @@ use crate::robot::mechanism::{
 use crate::verify::{Client, PythonClient};
 use crate::xml::escaped;
 use crate::{ExportError, ExportModel, File, Format, RobotReader};
-use residyn_core::model::chain::Joint;
+use residyn_core::model::tree::Joint;
 
 pub(crate) const FORMAT: Format = Format {
     name: "mjcf",
-    about: "a serial mechanism with its friction, springs and drives, for MuJoCo",
+    about: "a mechanism with its friction, springs and drives, for MuJoCo",
     extension: "xml",
     not_carried,
     files,
@@ -26,7 +26,7 @@ pub(crate) const FORMAT: Format = Format {
     }),
     tolerance: 1e-9,
     robots: Some(RobotReader {
-        about: "up to twelve hinge or slide joints in series",
+        about: "up to 40 hinge or slide joints",
         read: read_mjcf,
         root: "mujoco",
         effects: &["viscous_friction", "coulomb_friction", "rotor_inertia"],
@@ -64,11 +64,8 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
         friction_widths(model)
     );
     let links = mechanism.links();
-    for (k, (joint, link)) in mechanism.joints.iter().zip(&links).enumerate() {
-        text += &body(joint, link, links.get(k + 1), &"  ".repeat(k + 2));
-    }
-    for k in (0..links.len()).rev() {
-        let _ = writeln!(text, "{}</body>", "  ".repeat(k + 2));
+    for k in mechanism.carried_by(None) {
+        text += &body(mechanism, &links, k, 2);
     }
     text += "  </worldbody>\n  <actuator>\n";
     for (joint, drive) in mechanism.joints.iter().zip(&mechanism.drives) {
@@ -77,8 +74,12 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
     text + "  </actuator>\n</mujoco>\n"
 }
 
-/// A body, its element left open for the next.
-fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String {
+/// A body with those that it carries, `depth` elements deep.
+fn body(mechanism: &Mechanism, links: &[Link], k: usize, depth: usize) -> String {
+    let indent = "  ".repeat(depth);
+    let (joint, link) = (&mechanism.joints[k], &links[k]);
+    let carried: Vec<usize> = mechanism.carried_by(Some(k)).collect();
+    let next = carried.first().map(|next| &links[*next]);
     let end = next.map_or(link.centre, |next| next.pose.origin);
     let shape = match end.norm() {
         0.0 => "type=\"sphere\" size=\"0.04\"".to_owned(),
@@ -90,7 +91,7 @@ fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String
             )
         }
     };
-    format!(
+    let own = format!(
         "{indent}<body name=\"{}\" pos=\"{}\" xyaxes=\"{}\">\n\
          {indent}  <joint name=\"{}\" type=\"{}\" axis=\"{}\"{}/>\n\
          {indent}  {}\n\
@@ -103,7 +104,11 @@ fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String
         numbers(&link.axis),
         of_joint(joint),
         inertial(&link.centre, link.mass, &link.tensor),
-    )
+    );
+    let others = carried
+        .iter()
+        .map(|k| body(mechanism, links, *k, depth + 1));
+    own + &others.collect::<String>() + &indent + "</body>\n"
 }
 
 /// Attributes of the joint's drivetrain.

@@ -10,7 +10,7 @@ use super::servo::{Servo, servos};
 use super::value;
 use crate::xml::escaped;
 use crate::{ExportError, ExportModel, ExportedEffect, File};
-use residyn_core::model::chain::{Joint, Pose, Spring, recover, rounded};
+use residyn_core::model::tree::{Joint, Pose, Spring, recover, rounded};
 use residyn_core::sim::{RK4, SEMI_IMPLICIT_EULER, Scheme};
 
 /// A mechanism with its drives.
@@ -152,17 +152,25 @@ impl Mechanism {
         }
     }
 
-    /// The bodies, from the base outwards.
+    /// Places of the joints that this joint carries, or the base.
+    pub fn carried_by(&self, parent: Option<usize>) -> impl Iterator<Item = usize> {
+        let joints = self.joints.iter().enumerate();
+        let carried = joints.filter(move |(_, joint)| joint.parent == parent);
+        carried.map(|(k, _)| k)
+    }
+
+    /// The bodies, in the order of their joints.
     pub fn links(&self) -> Vec<Link> {
-        let mut parent = Pose::identity();
+        // The body's frame is put at the joint.
+        let in_body = |joint: &Joint| Pose {
+            origin: Vector3::zeros(),
+            ..joint.in_body()
+        };
         let link = |joint: &Joint| {
-            // The body's frame is put at the joint.
-            let own = Pose {
-                origin: Vector3::zeros(),
-                ..joint.in_body()
-            };
+            let own = in_body(joint);
+            let parent = joint.parent.map(|parent| in_body(&self.joints[parent]));
+            let parent = parent.unwrap_or_else(Pose::identity);
             let pose = parent.then(&joint.at_zero()).then(&own.inverse());
-            parent = own;
             let inertia = joint.inertia.seen_from(&own);
             let (centre, tensor) = inertia.about_centre();
             Link {

@@ -1,11 +1,11 @@
-//! A tree of bodies, each welded to its parent or attached by joints, and the chain from its base to one of them.
+//! A tree of bodies, each welded to its parent or attached by joints, and the joints that a model has.
 
 use nalgebra::Vector3;
 
 use crate::xml::Source;
 use residyn_core::expr::{listed, suggestion};
 use residyn_core::limits::JOINTS;
-use residyn_core::model::chain::{
+use residyn_core::model::tree::{
     Drivetrain, Follows, Inertia, Joint, Pose, fault, with_z_along, without_inertia,
 };
 use residyn_core::model::{FileError, FileRemedy};
@@ -52,13 +52,6 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    /// Number of joints on the longest branch that follow no other.
-    fn depth(&self) -> usize {
-        let own = self.joints.iter().filter(|hinge| hinge.mimics.is_none());
-        let below = self.children.iter().map(Self::depth).max();
-        own.count() + below.unwrap_or(0)
-    }
-
     /// Its name and those of all its descendants.
     pub fn names(&self) -> Vec<&str> {
         let below = self.children.iter().flat_map(Self::names);
@@ -71,28 +64,24 @@ impl Body {
     }
 }
 
-/// The joints from the base to the body `tip`, by default to the end of the longest branch. Bodies on other branches
-/// are welded where the file draws them, with a note.
+/// The joints of the whole tree or, with a `tip`, those from the base to the body of that name: bodies on other branches
+/// are then welded where the file draws them, with a note.
 ///
 /// # Errors
-/// An unknown tip, several branches of the greatest length, no joint or too many, joints that move no inertia, a joint that
-/// follows one off the chain.
-pub(crate) fn chain(
+/// An unknown tip, no joint or too many, joints that move no inertia, a joint that follows one that is left out.
+pub(crate) fn joints(
     source: &Source<'_>,
     base: &Body,
     tip: Option<&str>,
 ) -> Result<Vec<Joint>, FileError> {
-    let path = match tip {
-        Some(tip) => path_to(source, base, tip)?,
-        None => longest(source, base)?,
-    };
+    let path = tip.map(|tip| path_to(source, base, tip)).transpose()?;
     let mut growth = Growth {
         source,
         path,
         joints: Vec::new(),
         hinges: Vec::new(),
     };
-    growth.grow(base, &Pose::identity())?;
+    growth.grow(base, &Pose::identity(), None)?;
     growth.link_followers()?;
     let Growth { joints, hinges, .. } = growth;
     if joints.is_empty() {
@@ -128,28 +117,6 @@ fn path_to<'b>(source: &Source<'_>, base: &'b Body, tip: &str) -> Result<Vec<&'b
     Ok(path)
 }
 
-/// The bodies from the base to the end of the branch with the most joints.
-fn longest<'b>(source: &Source<'_>, base: &'b Body) -> Result<Vec<&'b Body>, FileError> {
-    let mut path = vec![base];
-    while let Some(last) = path.last() {
-        let most = last.children.iter().map(Body::depth).max().unwrap_or(0);
-        let mut ends = last.children.iter().filter(|child| child.depth() == most);
-        let (Some(next), true) = (ends.next(), most > 0) else {
-            break;
-        };
-        if let Some(other) = ends.next() {
-            let message = format!(
-                "`{}` branches: both `{}` and `{}` move; name the last body of the chain, such as `{}`",
-                last.name, next.name, other.name, last.name
-            );
-            let error = source.error_at(other.at, message);
-            return Err(error.remedied_by(FileRemedy::Tip));
-        }
-        path.push(next);
-    }
-    Ok(path)
-}
-
 /// A name with only the characters of file names and columns.
 pub(crate) fn plain(name: &str) -> String {
     let plain = |c: char| {
@@ -162,68 +129,86 @@ pub(crate) fn plain(name: &str) -> String {
     name.chars().map(plain).collect()
 }
 
-/// A chain under construction.
+/// A tree under construction.
 struct Growth<'t, 's, 'x> {
     source: &'s Source<'x>,
-    /// The bodies from the base to the tip.
-    path: Vec<&'t Body>,
+    /// The bodies from the base to the tip, if the joints of others are left out.
+    path: Option<Vec<&'t Body>>,
     joints: Vec<Joint>,
     /// The hinges that the joints come from.
     hinges: Vec<&'t Hinge>,
 }
 
 impl<'t> Growth<'t, '_, '_> {
-    /// Add a body of the path and its descendants; `parent` is its parent's frame in the frame of the last joint.
-    fn grow(&mut self, body: &'t Body, parent: &Pose) -> Result<(), FileError> {
+    /// Add a body and its descendants. `parent` is its parent's frame in the frame of joint `last`, or in the world.
+    fn grow(
+        &mut self,
+        body: &'t Body,
+        parent: &Pose,
+        mut last: Option<usize>,
+    ) -> Result<(), FileError> {
         let mut frame = parent.then(&body.pose);
         for hinge in &body.joints {
-            if self.joints.len() == JOINTS {
-                let message = format!(
-                    "joint `{}` is one too many: at most {JOINTS} are read; end the chain before it, or fix the joints that the rig does not use",
-                    hinge.name
-                );
-                let error = self.source.error_at(hinge.at, message);
-                return Err(error.remedied_by(FileRemedy::Tip));
-            }
+            self.check_room(hinge)?;
             let own = Pose {
                 rotation: with_z_along(hinge.axis),
                 origin: hinge.anchor,
             };
+            let joint = joint(body, hinge, last, frame.then(&own))?;
+            last = Some(self.joints.len());
             self.hinges.push(hinge);
-            self.joints.push(joint(body, hinge, frame.then(&own))?);
+            self.joints.push(joint);
             frame = own.inverse();
         }
-        self.take(body, &frame)?;
-        let is_next = |child: &&Body| self.path.iter().any(|other| std::ptr::eq(*other, *child));
-        let next = body.children.iter().find(is_next);
-        // Welded bodies belong to this joint: they come before the next joint.
-        let is_other = |child: &&Body| next.is_none_or(|next| !std::ptr::eq(next, *child));
-        for child in body.children.iter().filter(is_other) {
-            self.weld(child, &frame)?;
+        self.take(body, &frame, last)?;
+        for child in &body.children {
+            match self.is_kept(child) {
+                true => self.grow(child, &frame, last)?,
+                false => self.weld(child, &frame, last)?,
+            }
         }
-        next.map_or(Ok(()), |next| self.grow(next, &frame))
+        Ok(())
     }
 
-    /// Add a body off the path and its descendants to the last joint.
-    fn weld(&mut self, body: &Body, parent: &Pose) -> Result<(), FileError> {
+    fn is_kept(&self, body: &Body) -> bool {
+        let is_on = |path: &Vec<&Body>| path.iter().any(|other| std::ptr::eq(*other, body));
+        self.path.as_ref().is_none_or(is_on)
+    }
+
+    fn check_room(&self, hinge: &Hinge) -> Result<(), FileError> {
+        let leads = |hinge: &Hinge| hinge.mimics.is_none();
+        let leaders = self.hinges.iter().filter(|hinge| leads(hinge)).count();
+        if leaders < JOINTS || !leads(hinge) {
+            return Ok(());
+        }
+        let message = format!(
+            "joint `{}` is one too many: at most {JOINTS} are read; name the last body of one limb, or fix the joints that the rig does not use",
+            hinge.name
+        );
+        let error = self.source.error_at(hinge.at, message);
+        Err(error.remedied_by(FileRemedy::Tip))
+    }
+
+    /// Add a body off the path and its descendants to what joint `last` moves.
+    fn weld(&mut self, body: &Body, parent: &Pose, last: Option<usize>) -> Result<(), FileError> {
         for hinge in &body.joints {
             let note = format!(
-                "joint `{}` is off the chain: `{}` is held where the file draws it",
+                "joint `{}` is not on the way to the tip: `{}` is held where the file draws it",
                 hinge.name, body.name
             );
             self.source.note_at(hinge.at, note);
         }
         let frame = parent.then(&body.pose);
-        self.take(body, &frame)?;
+        self.take(body, &frame, last)?;
         let mut children = body.children.iter();
-        children.try_for_each(|child| self.weld(child, &frame))
+        children.try_for_each(|child| self.weld(child, &frame, last))
     }
 
-    /// Add a body's inertia to what the last joint moves, if there is a joint; `frame` is the body's frame in the
-    /// joint's.
-    fn take(&mut self, body: &Body, frame: &Pose) -> Result<(), FileError> {
-        if let Some(last) = self.joints.last_mut() {
+    /// Add a body's inertia to what joint `last` moves, if there is one; `frame` is the body's frame in the joint's.
+    fn take(&mut self, body: &Body, frame: &Pose, last: Option<usize>) -> Result<(), FileError> {
+        if let Some(last) = last {
             let own = body.inertia.clone()?;
+            let last = &mut self.joints[last];
             last.inertia = last.inertia.with(&own.seen_from(frame));
         }
         Ok(())
@@ -239,7 +224,7 @@ impl<'t> Growth<'t, '_, '_> {
             let is_leader = |other: &&Hinge| other.name == mimics.leader && other.mimics.is_none();
             let Some(leader) = leaders.position(is_leader) else {
                 let message = format!(
-                    "joint `{}` follows `{}`, which is not an independent joint of the chain; end the chain elsewhere, or fix the joint",
+                    "joint `{}` follows `{}`, which is not an independent joint of the model; name another last body, or fix the joint",
                     hinge.name, mimics.leader
                 );
                 let error = self.source.error_at(hinge.at, message);
@@ -263,10 +248,16 @@ impl<'t> Growth<'t, '_, '_> {
     }
 }
 
-fn joint(body: &Body, hinge: &Hinge, pose: Pose) -> Result<Joint, FileError> {
+fn joint(
+    body: &Body,
+    hinge: &Hinge,
+    parent: Option<usize>,
+    pose: Pose,
+) -> Result<Joint, FileError> {
     Ok(Joint {
         name: hinge.name.clone(),
         body: body.name.clone(),
+        parent,
         slides: hinge.slides.clone()?,
         pose,
         reference: hinge.reference,

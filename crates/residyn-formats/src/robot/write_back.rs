@@ -9,9 +9,7 @@ use super::value;
 use crate::xml::Source;
 use crate::{FORMATS, Format, xml};
 use residyn_core::data::Joint;
-use residyn_core::model::chain::{
-    Chain, Drivetrain, Inertia, ValuesError, added, fault, model_text,
-};
+use residyn_core::model::tree::{Drivetrain, Inertia, Tree, ValuesError, added, fault, model_text};
 use residyn_core::model::{FileError, FileRemedy, FittedEffect, Library, Model};
 
 /// A model's changes to a joint of the description and to the body that it moves.
@@ -52,20 +50,20 @@ pub fn write_back(model: &Model, file: &Path, tip: Option<&str>) -> Result<Writt
     let source = Source::new(file, &text)?;
     let format = format(&source)?;
     let robots = format.robots.as_ref().expect("it was found by what it has");
-    let chain = (robots.read)(file, tip)?;
+    let tree = (robots.read)(file, tip)?;
     let refused = |message: String| FileError::new(file, None, message);
     let of_other_file = |message| refused(message).remedied_by(FileRemedy::Tip);
     let model = model.absorbed();
-    check_joints(&model, &chain).map_err(of_other_file)?;
+    check_joints(&model, &tree).map_err(of_other_file)?;
     let library = Library::built_in();
-    let declared = Model::from_text(file, &model_text(&chain), library.effects())?;
+    let declared = Model::from_text(file, &model_text(&tree), library.effects())?;
     let value = |name: &str| value(&model.parameters, name);
-    let added = added(&chain, value).map_err(|error| match error {
+    let added = added(&tree, value).map_err(|error| match error {
         ValuesError::Missing(_) => of_other_file(error.to_string()),
         ValuesError::NoBodies => refused(error.to_string()),
     })?;
     check_equations(&model, &declared).map_err(refused)?;
-    let changes = changes(&model, &declared, &chain, &added);
+    let changes = changes(&model, &declared, &tree, &added);
     let mut edit = Edit::of(&text);
     (robots.rewrite)(&source, &mut edit, &changes)?;
     Ok(WrittenBack {
@@ -90,8 +88,8 @@ fn format(source: &Source<'_>) -> Result<&'static Format, FileError> {
 }
 
 /// Refuse a file whose joints are not those of the model.
-fn check_joints(model: &Model, chain: &Chain) -> Result<(), String> {
-    let of_file: Vec<&str> = chain
+fn check_joints(model: &Model, tree: &Tree) -> Result<(), String> {
+    let of_file: Vec<&str> = tree
         .leaders()
         .map(|(_, joint)| joint.name.as_str())
         .collect();
@@ -100,7 +98,7 @@ fn check_joints(model: &Model, chain: &Chain) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "the chain has the joints {}, {} has {}; give the file that the model was made from, and the same last body",
+        "the file has the joints {}, {} has {}; give the file that the model was made from, and the same last body",
         of_file.join(", "),
         model.name,
         match of_model[..] {
@@ -143,17 +141,17 @@ fn check_equations(model: &Model, declared: &Model) -> Result<(), String> {
     }
 }
 
-fn changes(model: &Model, declared: &Model, chain: &Chain, added: &[Inertia]) -> Vec<Change> {
+fn changes(model: &Model, declared: &Model, tree: &Tree, added: &[Inertia]) -> Vec<Change> {
     let mut numbers = Joint::all(model.joints);
-    let drivetrain = |joint: &residyn_core::model::chain::Joint, number: Joint| Drivetrain {
+    let drivetrain = |joint: &residyn_core::model::tree::Joint, number: Joint| Drivetrain {
         damping: sum(model, DAMPING, number),
         friction: sum(model, FRICTION, number),
-        // In a short chain, some rotors are part of other parameters.
+        // In a small model, some rotors are part of other parameters.
         armature: joint.drivetrain.armature + sum(model, ROTOR, number)
             - sum(declared, ROTOR, number),
         ..joint.drivetrain
     };
-    let joints = chain.joints.iter().zip(added);
+    let joints = tree.joints.iter().zip(added);
     joints
         .map(|(joint, added)| Change {
             joint: joint.name.clone(),

@@ -1,4 +1,4 @@
-//! Reads a serial mechanism: links, each attached to its parent by one joint.
+//! Reads a mechanism: links, each attached to its parent by one joint.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -10,31 +10,31 @@ use crate::robot::tree::{self, Body, Hinge, Mimics};
 use crate::xml::{self, Source, named};
 use residyn_core::limits::XML_DEPTH;
 use residyn_core::model::FileError;
-use residyn_core::model::chain::{Chain, Drivetrain, Inertia, Pose, turn};
+use residyn_core::model::tree::{Drivetrain, Inertia, Pose, Tree, turn};
 
 /// Gravity, which the format does not contain: m/s^2, against z.
 pub(super) const GRAVITY: f64 = 9.81;
 
-/// Read the serial chain from the root of a URDF file to the link `tip`, by default to the end of the longest branch.
+/// Read the tree of a URDF file, or its branch from the root to the link `tip`. A floating base is fixed, with a note.
 /// Gravity acts against z of the root link.
 ///
 /// # Errors
-/// An unreadable file, invalid XML, or anything but a serial chain of revolute, continuous or prismatic joints: with
+/// An unreadable file, invalid XML, or anything but a tree of revolute, continuous or prismatic joints: with
 /// line, column and remedy.
-pub fn read_urdf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
+pub fn read_urdf(path: &Path, tip: Option<&str>) -> Result<Tree, FileError> {
     let text = xml::text(path)?;
     let source = Source::new(path, &text)?;
     let file = Robot::new(&source)?;
     let base = file.base()?;
     let tree = file.body(base, None, &file.joints_below()?, 0)?;
     file.check_all_hang_on(&tree)?;
-    let joints = tree::chain(&source, &tree, tip)?;
+    let joints = tree::joints(&source, &tree, tip)?;
     file.note_the_rest();
     let name = file
         .root
         .attribute("name")
         .map_or_else(|| source.stem(), tree::plain);
-    Ok(Chain {
+    Ok(Tree {
         name,
         gravity: Vector3::new(0.0, 0.0, -GRAVITY),
         joints,
@@ -224,11 +224,17 @@ impl<'s, 'x> Robot<'s, 'x> {
         let name = element.required_text("name")?;
         let slides = match element.required_text("type")? {
             "fixed" => return Ok(None),
+            "floating" => {
+                element.note(format!(
+                    "`{name}` floats; its child is fixed where the file draws it"
+                ));
+                return Ok(None);
+            }
             "revolute" | "continuous" => Ok(false),
             "prismatic" => Ok(true),
             other => {
                 let message = format!(
-                    "joint `{name}` is of type `{other}`; only fixed, revolute, continuous and prismatic are known: fix the joint, or describe it by several"
+                    "joint `{name}` is of type `{other}`; only fixed, floating, revolute, continuous and prismatic are known: fix the joint, or describe it by several"
                 );
                 Err(element.attribute_error("type", message))
             }

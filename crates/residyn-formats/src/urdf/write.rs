@@ -11,11 +11,11 @@ use crate::robot::mechanism::{Link, Mechanism, file, friction_widths, head, numb
 use crate::verify::{Client, PythonClient};
 use crate::xml::escaped;
 use crate::{ExportError, ExportModel, File, Format, RobotReader};
-use residyn_core::model::chain::Joint;
+use residyn_core::model::tree::Joint;
 
 pub(crate) const FORMAT: Format = Format {
     name: "urdf",
-    about: "a serial mechanism with damping, dry friction and limits of the drives",
+    about: "a mechanism with damping, dry friction and limits of the drives",
     extension: "urdf",
     not_carried,
     files,
@@ -26,7 +26,7 @@ pub(crate) const FORMAT: Format = Format {
     }),
     tolerance: 1e-9,
     robots: Some(RobotReader {
-        about: "up to twelve revolute, continuous or prismatic joints in series",
+        about: "up to 40 revolute, continuous or prismatic joints",
         read: read_urdf,
         root: "robot",
         effects: &["viscous_friction", "coulomb_friction"],
@@ -81,16 +81,15 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
         option(model, mechanism),
         friction_widths(model)
     );
-    let mut parent = "base";
     for ((joint, link), drive) in mechanism
         .joints
         .iter()
         .zip(mechanism.links())
         .zip(&mechanism.drives)
     {
+        let parent = (joint.parent).map_or("base", |parent| &mechanism.joints[parent].body);
         text += &of_link(&joint.body, &link);
         text += &of_joint(joint, &link, parent, drive.limit);
-        parent = &joint.body;
     }
     text + "</robot>\n"
 }

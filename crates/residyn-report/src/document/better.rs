@@ -20,10 +20,20 @@ pub(super) fn answer(report: &Report) -> Vec<Block> {
     let torque = report.torque.as_ref();
     let torque = torque.map(|torque| of_torques(report, torque));
     let mut errors = [of_motion(report), torque.unwrap_or_default()];
-    if report.compared == ErrorModel::InverseDynamics {
+    if judges_by_torques(report) {
         errors.reverse();
     }
     [about(report), errors.concat(), of_test_logs(report)].concat()
+}
+
+/// Whether the torques show how good a model is. Where drives hold commanded positions, the motion does: closed loops do not
+/// diverge.
+pub(crate) fn judges_by_torques(report: &Report) -> bool {
+    report.compared == ErrorModel::InverseDynamics && !is_commanded(report)
+}
+
+fn is_commanded(report: &Report) -> bool {
+    report.driven_by == Quantity::Command.key()
 }
 
 /// What the models are, and what was compared.
@@ -63,13 +73,19 @@ pub(crate) fn fitted_tests(report: &Report) -> Option<String> {
 fn compared(report: &Report) -> String {
     match report.compared {
         ErrorModel::OutputError => {
-            let driving = match report.driven_by == Quantity::Command.key() {
+            let driving = match is_commanded(report) {
                 true => "commands",
                 false => "torques",
             };
             format!(
                 "Models are fitted to, selected and compared by the open-loop motion under the logged {driving}."
             )
+        }
+        ErrorModel::InverseDynamics if is_commanded(report) => {
+            "Models are fitted and effects are selected by the torques that the logged motion needs, compared with those \
+             that the law of the drives asks for; models are compared by the motion under the logged commands. No torque \
+             was measured: the gains of the law are the scale of all forces and inertias."
+                .to_owned()
         }
         ErrorModel::InverseDynamics => {
             "Models are fitted to, selected and compared by the torques that the logged motion needs: a controller \
@@ -78,6 +94,14 @@ fn compared(report: &Report) -> String {
              loads."
                 .to_owned()
         }
+    }
+}
+
+/// What the last row of a table of torque errors gives.
+pub(crate) fn all_torques(report: &Report) -> &'static str {
+    match is_commanded(report) {
+        true => "all, share of what the drives ask for",
+        false => "all, share of the logged torques",
     }
 }
 
@@ -110,7 +134,7 @@ fn of_torques(report: &Report, errors: &TorqueErrors) -> Vec<Block> {
         row(report.label(joint), &|error| small(error.rms[joint]), share)
     };
     let all = row(
-        "all, share of the logged torques".to_owned(),
+        all_torques(report).to_owned(),
         &TorqueError::share,
         ratio(errors.after.relative, errors.before.relative),
     );

@@ -20,7 +20,9 @@ use super::schema::{ParameterEntry, Report};
 use super::wording::{amount, capitalised};
 use residyn_core::data::together;
 
-pub(super) use better::{fitted_tests, force_unit, position_unit, removed};
+pub(super) use better::{
+    all_torques, fitted_tests, force_unit, judges_by_torques, position_unit, removed,
+};
 pub(super) use calibration::alarms;
 pub(super) use left::{proposal_line, structure};
 pub(super) use made::of_call;

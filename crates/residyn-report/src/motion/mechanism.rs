@@ -7,7 +7,7 @@ use super::sketch::{PictureEntry, Point, Sketch};
 use crate::plot_data::span;
 use residyn_core::closeloop::Outcome;
 use residyn_core::decomposition::eigen;
-use residyn_core::model::chain::{Joint, Pose, recover};
+use residyn_core::model::tree::{Joint, Pose, recover};
 
 /// Half the length of the line that stands for the base, as a share of the mechanism.
 const BASE: f64 = 0.12;

@@ -1,10 +1,12 @@
 //! How much better: errors on the test logs, one row per joint.
 
 use super::{listed, paragraph};
-use crate::document::{fitted_tests, force_unit, position_unit, removed};
+use crate::document::{
+    all_torques, fitted_tests, force_unit, judges_by_torques, position_unit, removed,
+};
 use crate::schema::{ModelError, Report};
 use crate::wording::{WITH_FRICTION, small};
-use residyn_core::closeloop::{ErrorModel, TorqueErrors};
+use residyn_core::closeloop::TorqueErrors;
 use residyn_core::data::Joint;
 
 /// Most rows of the table, not counting the row of all joints.
@@ -13,8 +15,8 @@ const ROWS: usize = 7;
 const OTHERS: usize = 2;
 
 pub(super) fn lines(report: &Report) -> Vec<String> {
-    let mut lines = match (report.compared, &report.torque) {
-        (ErrorModel::InverseDynamics, Some(torque)) => of_torques(report, torque),
+    let mut lines = match &report.torque {
+        Some(torque) if judges_by_torques(report) => of_torques(report, torque),
         _ => of_motion(report),
     };
     let fitted = fitted_tests(report).into_iter();
@@ -47,7 +49,7 @@ fn of_torques(report: &Report, errors: &TorqueErrors) -> Vec<String> {
     let rows = Joint::all(report.joints).map(of_joint).collect();
     let mut rows = listed(rows, ROWS, "joints");
     let share = models.map(|model| model.share());
-    rows.push(row("all, share of the logged torques", share));
+    rows.push(row(all_torques(report), share));
     let friction = errors.with_friction.as_ref();
     rows.extend(friction.map(|model| format!("  {WITH_FRICTION} alone: {}", model.share())));
     table(

@@ -10,7 +10,7 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::request::Reference;
 use crate::closeloop::settings::ScoreSettings;
-use crate::data::Log;
+use crate::data::{Log, Quantity};
 use crate::identify::calibrate_first;
 use crate::model::{Dynamics, Model};
 use crate::sim::metric::{Assessment, TorqueError, assess, torque_error};
@@ -101,7 +101,10 @@ impl Scorer<'_> {
     /// Score each model.
     pub fn errors(&self, models: Scored<'_>, rng: &mut impl Rng) -> Errors {
         let scored = |other: &Reference| (other.name.clone(), self.as_it_is(&other.model));
-        let torque = self.torques(models, rng);
+        // Logs of commands hold no torques: those that the drives ask for matter only if they were fitted.
+        let is_fitted = models.problem.error_model == ErrorModel::InverseDynamics;
+        let has_torques = is_fitted || models.declared.driven_by() == Quantity::Torque;
+        let torque = has_torques.then(|| self.torques(models, rng)).flatten();
         let fitted = [models.before, models.after];
         let (before, after) = rayon::join(|| self.fitted(fitted[0]), || self.fitted(fitted[1]));
         Errors {

@@ -9,6 +9,7 @@ use super::joint::JointAudit;
 use crate::data::Joint;
 use crate::data::column::Quantity;
 use crate::data::log::Interval;
+use crate::data::of_joints;
 
 /// Longer lists of intervals than these are not practical to paste, or to read.
 const MOST_SPANS: usize = 20;
@@ -49,6 +50,16 @@ pub struct Audit {
 }
 
 impl Audit {
+    /// What concerns these joints, without the findings.
+    #[must_use]
+    pub(crate) fn of_joints(&self, joints: &[Joint]) -> Self {
+        Self {
+            joints: of_joints(&self.joints, joints),
+            findings: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     /// Add what was found later, in its place.
     pub(crate) fn add(&mut self, finding: Finding) {
         self.findings.push(finding);

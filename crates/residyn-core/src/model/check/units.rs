@@ -134,7 +134,7 @@ impl Units<'_> {
                     self.expect(&format!("entry {i} of `bias`"), &bias[i], force);
                 }
             }
-            Motion::Chain(bodies) => {
+            Motion::Tree(bodies) => {
                 for formula in &bodies.gravity {
                     self.expect("`gravity`", formula, unit("m/s^2"));
                 }

@@ -56,7 +56,7 @@ pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
 pub(crate) fn torque_error_with(model: &Model, logs: &[Log], dry: &[bool]) -> Option<TorqueError> {
     let balance = model.torque_balance()?;
     let of_log = |log: &Log| {
-        let (logged, differences) = differences(&balance, log);
+        let (logged, differences) = differences(model, &balance, log);
         Squares::of(&logged, &differences, dry)
     };
     let found: Vec<Squares> = logs.par_iter().map(of_log).collect();
@@ -157,7 +157,7 @@ pub struct NeededTorques {
 
 /// The torques that a log's motion needs according to a model; `None` for a model that gives accelerations.
 pub fn needed_torques(model: &Model, log: &Log) -> Option<NeededTorques> {
-    let (smooth, differences) = differences(&model.torque_balance()?, log);
+    let (smooth, differences) = differences(model, &model.torque_balance()?, log);
     let logged = smooth.tau.iter();
     let sum = |(logged, difference): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
         let both = logged.iter().zip(difference);
@@ -171,8 +171,9 @@ pub fn needed_torques(model: &Model, log: &Log) -> Option<NeededTorques> {
     })
 }
 
-/// A log, smoothed, and the torques that its motion needs beyond those that act, `[joint][row]`.
-fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
+/// A log, smoothed, with the torques that its drives ask for if it has commands, and the torques that its motion needs
+/// beyond those that act, `[joint][row]`.
+fn differences(model: &Model, balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
     let in_log = balance.in_log(log);
     let smoothing = Smoothing::of(log);
     let logged = Smooth::by(&smoothing, log, &[]);
@@ -190,7 +191,11 @@ fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
         ..logged.clone()
     };
     let found = balance_of(&in_log, &acting);
-    (logged, found)
+    let asked = Smooth {
+        tau: model.smooth_drive_torques(&logged),
+        ..logged
+    };
+    (asked, found)
 }
 
 /// The values of a torque balance along a smoothed motion with its torques, `[joint][row]`.

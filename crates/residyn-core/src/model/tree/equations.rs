@@ -1,6 +1,6 @@
-//! The equations of motion of a chain, M(q) qdd + h(q, qd) + g dV/dq = tau, linear in the physical parameters.
+//! The equations of motion of a tree, M(q) qdd + h(q, qd) + g dV/dq = tau, linear in the physical parameters.
 //!
-//! Velocities are propagated along the chain as Jacobians (the share of each joint), in the axes of each link. The
+//! Velocities are propagated along the tree as Jacobians (the share of each joint), in the axes of each link. The
 //! contribution of one unit of a parameter to the mass matrix and to the potential is then a sum of products.
 
 use nalgebra::{Matrix3, Vector3};
@@ -122,18 +122,21 @@ impl Kind {
     }
 }
 
-/// The non-zero parameters of a chain, in order of preference, rotors last.
+/// The non-zero parameters of a tree, in order of preference, rotors last.
 pub(super) fn columns(joints: &[Joint], gravity: &Vector3<f64>) -> Vec<Column> {
     let lengths = Lengths::of(joints);
-    let mut frame = Frame::base(joints.len(), gravity);
+    let base = Frame::base(joints.len(), gravity);
+    let mut frames: Vec<Frame> = Vec::with_capacity(joints.len());
     let mut columns = Vec::new();
     for (k, joint) in joints.iter().enumerate() {
-        frame = frame.beyond(k, joint);
+        let parent = joint.parent.map_or(&base, |parent| &frames[parent]);
+        let frame = parent.beyond(k, joint);
         let mut kinds = OF_TURNING;
         if joint.slides {
             kinds.rotate_right(1);
         }
         columns.extend(kinds.map(|kind| frame.column(kind, k, joint)));
+        frames.push(frame);
     }
     columns.extend(joints.iter().enumerate().map(|(k, joint)| Column {
         mass: rotor(joints.len(), k),
@@ -183,7 +186,7 @@ impl Frame {
         }
     }
 
-    /// The frame of the link that joint `k` moves, from that of the previous link (this one).
+    /// The frame of the link that joint `k` moves, from that of its parent (this one).
     fn beyond(&self, k: usize, joint: &Joint) -> Self {
         let step = origin(k, joint);
         let carried = |(v, w): (&Vector, &Vector)| inward(k, joint, &add(v, &cross(w, &step)));
@@ -236,7 +239,7 @@ impl Frame {
     }
 }
 
-/// The origin of the link's frame in the frame of the previous link.
+/// The origin of the link's frame in the frame of its parent.
 fn origin(k: usize, joint: &Joint) -> Vector {
     let rest = constant(&joint.pose.origin);
     if !joint.slides {
@@ -247,7 +250,7 @@ fn origin(k: usize, joint: &Joint) -> Vector {
     add(&rest, &std::array::from_fn(|a| &moved * along[a]))
 }
 
-/// A vector of the previous link in the axes of the link that joint `k` moves.
+/// A vector of the parent in the axes of the link that joint `k` moves.
 fn inward(k: usize, joint: &Joint, vector: &Vector) -> Vector {
     let at_rest = turned(&joint.pose.rotation.transpose(), vector);
     if joint.slides {
@@ -287,7 +290,7 @@ fn turned(by: &Matrix3<f64>, vector: &Vector) -> Vector {
     })
 }
 
-/// Typical magnitudes of coefficients: a power of the chain's length, by unit.
+/// Typical magnitudes of coefficients: a power of the tree's length, by unit.
 #[derive(Debug, Clone)]
 pub(super) struct Lengths {
     /// m
@@ -297,7 +300,8 @@ pub(super) struct Lengths {
 
 impl Lengths {
     pub fn of(joints: &[Joint]) -> Self {
-        let offsets = joints.iter().skip(1).map(|joint| joint.pose.origin.norm());
+        let carried = joints.iter().filter(|joint| joint.parent.is_some());
+        let offsets = carried.map(|joint| joint.pose.origin.norm());
         let longest = offsets.fold(0.0, f64::max);
         Self {
             length: if longest > 0.0 { longest } else { 1.0 },

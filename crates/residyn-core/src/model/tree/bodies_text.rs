@@ -1,10 +1,10 @@
-//! A chain of any length as the table `[chain]` of a model file: frames, and the inertia of each link as parameters.
+//! A tree of any size as the table `[chain]` of a model file: frames, and the inertia of each link as parameters.
 
 use std::fmt::Write;
 
 use nalgebra::Vector3;
 
-use super::body::{Chain, Joint, places};
+use super::body::{Joint, Tree, places};
 use super::equations::Kind;
 use super::formula::number;
 use super::model_file::{gravity_parameter, name, parameter, quoted};
@@ -12,11 +12,11 @@ use super::recursive::Place;
 use super::series::rounded;
 use crate::data;
 
-/// The bodies of a chain.
-pub(super) struct Bodies<'c>(pub &'c Chain);
+/// The bodies of a tree.
+pub(super) struct Bodies<'c>(pub &'c Tree);
 
 impl Bodies<'_> {
-    /// Parameters and chain of the model file.
+    /// Parameters and tree of the model file.
     pub fn text(&self) -> String {
         let mut text = "\n[parameters]\n".to_owned();
         for (number, joint) in self.links() {
@@ -42,7 +42,7 @@ impl Bodies<'_> {
         links.flat_map(|(number, _)| all(number)).collect()
     }
 
-    /// The links with their numbers along the chain, which appear in the names of their parameters.
+    /// The links with their numbers along the tree, which appear in the names of their parameters.
     fn links(&self) -> impl Iterator<Item = (data::Joint, &Joint)> {
         let joints = self.0.joints.iter().enumerate();
         joints.map(|(k, joint)| (data::Joint::at(k), joint))
@@ -91,10 +91,11 @@ fn link(text: &mut String, number: data::Joint, joint: &Joint, place: &Place) {
     };
     let _ = write!(
         text,
-        "\n[[chain.link]] # {}, moved by {}\njoint = {}\n{}origin = {}\naxis = {}\nacross = {}\nmass = {}\nmoment = {}\ninertia = {}\n",
+        "\n[[chain.link]] # {}, moved by {}\njoint = {}\n{}{}origin = {}\naxis = {}\nacross = {}\nmass = {}\nmoment = {}\ninertia = {}\n",
         joint.body,
         joint.name,
         place.joint,
+        parent(number, place),
         follows(joint, place),
         vector(&place.pose.origin),
         column(2),
@@ -103,6 +104,15 @@ fn link(text: &mut String, number: data::Joint, joint: &Joint, place: &Place) {
         names(&Kind::OF_BODY[1..4]),
         names(&Kind::OF_BODY[4..])
     );
+}
+
+/// The number of the link that a link sits on, unless it is the one before; 0 for the base.
+fn parent(number: data::Joint, place: &Place) -> String {
+    let on = place.parent.map_or(0, |parent| parent + 1);
+    match on == number.index() {
+        true => String::new(),
+        false => format!("parent = {on}\n"),
+    }
 }
 
 /// How a link follows a joint that also moves another link.

@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::decomposition::least_squares;
 use crate::model::Dynamics;
-use crate::model::chain::equations::christoffel;
-use crate::model::chain::series::Series;
+use crate::model::tree::equations::christoffel;
+use crate::model::tree::series::Series;
 
 /// The equations in a state: positions and velocities.
 type At<'a> = &'a dyn Fn(&[f64], &[f64]) -> DVector<f64>;

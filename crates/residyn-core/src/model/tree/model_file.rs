@@ -1,4 +1,4 @@
-//! Writes the model file of a chain.
+//! Writes the model file of a tree.
 
 use std::collections::HashSet;
 use std::fmt::Write;
@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::bodies_text::Bodies;
 use toml_edit::DocumentMut;
 
-use super::body::{Chain, Drivetrain, Joint};
+use super::body::{Drivetrain, Joint, Tree};
 use super::closed_form::ClosedForm;
 use super::equations::Kind;
 use super::formula::number;
@@ -21,42 +21,42 @@ const UNLIMITED_SERVO: &str = "position_loop";
 /// The drive parameter that is the effort limit.
 pub(super) const LIMIT: &str = "limit";
 
-const ABOUT: &str = "equations derived from the description of a serial mechanism";
+const ABOUT: &str = "equations derived from the description of a mechanism";
 
-/// The text of a chain's model file: up to three joints as equations in closed form with base parameters, longer chains
+/// The text of a tree's model file: up to three joints as equations in closed form with base parameters, more
 /// as bodies; damping, dry friction, rotors, springs and effort limits as effects.
-pub fn model_text(chain: &Chain) -> String {
-    let (equations, rotors) = if is_short(chain) {
-        let closed = ClosedForm::of(chain);
+pub fn model_text(tree: &Tree) -> String {
+    let (equations, rotors) = if is_short(tree) {
+        let closed = ClosedForm::of(tree);
         (closed.text(), closed.rotors())
     } else {
-        let armatures = chain.leaders().map(|(_, joint)| joint.drivetrain.armature);
-        (Bodies(chain).text(), armatures.collect())
+        let armatures = tree.leaders().map(|(_, joint)| joint.drivetrain.armature);
+        (Bodies(tree).text(), armatures.collect())
     };
-    let declared = with_drives([head(chain), equations].concat(), chain);
-    declared + &effects(chain, &rotors)
+    let declared = with_drives([head(tree), equations].concat(), tree);
+    declared + &effects(tree, &rotors)
 }
 
 /// Whether its equations are written in closed form.
-pub(super) fn is_short(chain: &Chain) -> bool {
+pub(super) fn is_short(tree: &Tree) -> bool {
     let follows = |joint: &Joint| joint.follows.is_some();
-    chain.joints.len() <= LONGEST_CLOSED_FORM && !chain.joints.iter().any(follows)
+    tree.joints.len() <= LONGEST_CLOSED_FORM && !tree.joints.iter().any(follows)
 }
 
 /// The text with the joints' drives, if some joint is not driven by a torque.
-fn with_drives(text: String, chain: &Chain) -> String {
+fn with_drives(text: String, tree: &Tree) -> String {
     let servo = |joint: &Joint| joint.drivetrain.servo.is_some();
-    if chain.drive.is_none() && !chain.joints.iter().any(servo) {
+    if tree.drive.is_none() && !tree.joints.iter().any(servo) {
         return text;
     }
     let mut model: DocumentMut = text.parse().expect("what is written here is TOML");
-    for (number, joint) in chain.leaders() {
+    for (number, joint) in tree.leaders() {
         let Drivetrain { servo, effort, .. } = joint.drivetrain;
         let gains = servo
             .into_iter()
             .flat_map(|servo| [("kp", servo.stiffness), ("kd", servo.damping)]);
         let known: Vec<(&str, f64)> = gains.chain(effort.map(|limit| (LIMIT, limit))).collect();
-        match drive_of(chain, joint) {
+        match drive_of(tree, joint) {
             Some(drive) => drive.write_into(&mut model, number, joint.slides, &known),
             None => write_plain(&mut model, number),
         }
@@ -65,18 +65,18 @@ fn with_drives(text: String, chain: &Chain) -> String {
 }
 
 /// What drives a joint, unless a torque does.
-fn drive_of(chain: &Chain, joint: &Joint) -> Option<ReadyDrive> {
+fn drive_of(tree: &Tree, joint: &Joint) -> Option<ReadyDrive> {
     let Drivetrain { servo, effort, .. } = joint.drivetrain;
     let name = effort.map_or(UNLIMITED_SERVO, |_| SERVO);
     let own = || ReadyDrive::find(Library::drives(), name).expect("an embedded drive");
-    chain.drive.clone().or_else(|| servo.map(|_| own()))
+    tree.drive.clone().or_else(|| servo.map(|_| own()))
 }
 
-fn head(chain: &Chain) -> String {
+fn head(tree: &Tree) -> String {
     let mut text = "# In the frame of each joint k, whose z is its axis: m_k mass, mx_k.. mass times centre of mass, xx_k.. inertia\n\
         # tensor of what moves with it up to the next joint, J_k inertia of its rotor.\n"
         .to_owned();
-    for (number, joint) in chain.leaders() {
+    for (number, joint) in tree.leaders() {
         let does = if joint.slides { "slides" } else { "turns" };
         let _ = writeln!(
             text,
@@ -87,17 +87,17 @@ fn head(chain: &Chain) -> String {
             direction(&joint.across)
         );
     }
-    for note in &chain.notes {
+    for note in &tree.notes {
         let _ = writeln!(text, "# {note}");
     }
     let _ = write!(
         text,
         "\n[system]\nname = {}\nabout = {}\njoints = {}\n",
-        quoted(&chain.name),
+        quoted(&tree.name),
         quoted(ABOUT),
-        chain.leaders().count()
+        tree.leaders().count()
     );
-    let names: Vec<String> = chain
+    let names: Vec<String> = tree
         .leaders()
         .map(|(_, joint)| quoted(&joint.name))
         .collect();
@@ -105,7 +105,7 @@ fn head(chain: &Chain) -> String {
     if names.iter().collect::<HashSet<_>>().len() == names.len() {
         let _ = writeln!(text, "joint_names = [{}]", names.join(", "));
     }
-    let slides: Vec<String> = chain
+    let slides: Vec<String> = tree
         .leaders()
         .filter(|(_, joint)| joint.slides)
         .map(|(number, _)| number.to_string())
@@ -145,8 +145,8 @@ pub(super) fn parameter(
 }
 
 /// The line that declares gravity.
-pub(super) fn gravity_parameter(chain: &Chain) -> String {
-    let g = chain.gravity.norm();
+pub(super) fn gravity_parameter(tree: &Tree) -> String {
+    let g = tree.gravity.norm();
     format!("g = {{ value = {g:?}, unit = \"m/s^2\", fixed = true }}\n")
 }
 
@@ -173,9 +173,9 @@ pub(super) fn short(value: f64) -> f64 {
 }
 
 /// Drivetrains as effects, with the rotor inertia (kg m^2 or kg) of each joint.
-fn effects(chain: &Chain, rotors: &[f64]) -> String {
+fn effects(tree: &Tree, rotors: &[f64]) -> String {
     let mut text = String::new();
-    for (number, joint) in chain.leaders() {
+    for (number, joint) in tree.leaders() {
         let mut effect = |name: &str, values: &[(&str, f64)]| {
             let _ = write!(text, "\n[[effect]]\nname = \"{name}\"\njoint = {number}\n");
             for (parameter, value) in values {
@@ -197,7 +197,7 @@ fn effects(chain: &Chain, rotors: &[f64]) -> String {
         if rotors[number] > 0.0 {
             effect("rotor_inertia", &[("J", rounded(rotors[number]))]);
         }
-        let in_drive = drive_of(chain, joint).is_some_and(|drive| drive.has(LIMIT));
+        let in_drive = drive_of(tree, joint).is_some_and(|drive| drive.has(LIMIT));
         if let Some(effort) = joint.drivetrain.effort.filter(|_| !in_drive) {
             effect("actuator_saturation", &[("m", effort)]);
             text += "fixed = true\n";

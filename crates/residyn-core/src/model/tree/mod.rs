@@ -1,7 +1,7 @@
-//! The mechanics of a serial chain of bodies: from a [`Chain`] to a model file ([`model_text`]), and back for a few
-//! kinds of mechanism (`recover`).
+//! The mechanics of a tree of bodies on a fixed base: from a [`Tree`] to a model file ([`model_text`]), and back for a
+//! few kinds of mechanism (`recover`).
 //!
-//! A long chain is written as its bodies; its equations are then written as operations ([`Links`]). A short one is
+//! A tree of many joints is written as its bodies; its equations are then written as operations ([`Links`]). A short one is
 //! written in closed form: each entry of the mass matrix is linear in the physical parameters, with Fourier series in
 //! the angles as coefficients. In this form equal functions look the same, so that parameters which the motion
 //! determines only in combination are found and lumped (base parameters).
@@ -22,7 +22,7 @@ mod spatial;
 mod values;
 mod weightless;
 
-pub use body::{Chain, Drivetrain, Follows, Joint, Servo, Spring};
+pub use body::{Drivetrain, Follows, Joint, Servo, Spring, Tree};
 pub use model_file::model_text;
 pub(crate) use pseudo_inertia::{Divergence, physical_parts};
 pub use recover::{Recovered, recover};

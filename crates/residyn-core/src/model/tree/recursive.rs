@@ -1,4 +1,4 @@
-//! Dynamics of a chain of any length as operations of a [`Graph`]: recursive Newton-Euler for the torques of a motion,
+//! Dynamics of a tree of links as operations of a [`Graph`]: recursive Newton-Euler for the torques of a motion,
 //! the composite-rigid-body algorithm for the mass matrix (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters
 //! 5 and 6).
 //!
@@ -15,10 +15,12 @@ use crate::expr::{Graph, Node, Unary};
 /// A vector of values.
 type Vector = [Node; 3];
 
-/// Where a link sits on the previous one, and how it moves.
+/// Where a link sits on another one, and how it moves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
-    /// The link's frame in that of the previous link (or the world) at coordinate zero; z is the axis.
+    /// Index of the link that it sits on, which comes before it; `None` for the base.
+    pub parent: Option<usize>,
+    /// The link's frame in that of its parent (or the world) at coordinate zero; z is the axis.
     pub pose: Pose,
     /// Whether it slides along its axis rather than turning about it.
     pub slides: bool,
@@ -40,7 +42,7 @@ pub struct Body<T> {
     pub tensor: [T; 6],
 }
 
-/// The links of a chain in some position.
+/// The links of a tree in some position.
 pub struct Links<'g> {
     graph: &'g mut Graph,
     links: Vec<Link>,
@@ -50,14 +52,16 @@ pub struct Links<'g> {
 }
 
 struct Link {
+    /// Index of the link that it sits on.
+    parent: Option<usize>,
     slides: bool,
     joint: Joint,
     ratio: Node,
-    /// Rotation from the previous link's axes to the joint's frame at zero.
+    /// Rotation from the parent's axes to the joint's frame at zero.
     fixed: Matrix3<f64>,
     /// Cosine and sine of a joint that turns.
     turn: Option<[Node; 2]>,
-    /// Origin in the axes of the previous link.
+    /// Origin in the axes of the parent.
     origin: Vector,
     body: Body<Node>,
 }
@@ -106,7 +110,7 @@ impl<T> Body<T> {
 }
 
 impl<'g> Links<'g> {
-    /// The chain at angles (rad) or positions (m) `q` of its joints, with `gravity` (m/s^2) in the axes of the world.
+    /// The tree at angles (rad) or positions (m) `q` of its joints, with `gravity` (m/s^2) in the axes of the world.
     pub fn at(
         graph: &'g mut Graph,
         places: &[Place],
@@ -128,21 +132,26 @@ impl<'g> Links<'g> {
     /// The torques (N m) or forces (N) that a motion needs.
     pub fn torques(&mut self, qd: &[Node], qdd: &[Node]) -> Vec<Node> {
         let zero = [self.graph.constant(0.0); 3];
-        let mut motion = Motion {
+        let still = Motion {
             angular: zero,
             angular_acceleration: zero,
             acceleration: self.upwards,
         };
-        let mut wrenches = Vec::with_capacity(self.links.len());
+        let mut motions: Vec<Motion> = Vec::with_capacity(self.links.len());
         for link in &self.links {
             let [qd, qdd] =
                 [qd, qdd].map(|of_joints| self.graph.mul(link.ratio, of_joints[link.joint]));
-            motion = link.carried(self.graph, &motion, qd, qdd);
-            wrenches.push(link.needed(self.graph, &motion));
+            let parent = link.parent.map_or(&still, |parent| &motions[parent]);
+            motions.push(link.carried(self.graph, parent, qd, qdd));
         }
-        for k in (1..self.links.len()).rev() {
-            let passed = self.links[k].passed_on(self.graph, &wrenches[k]);
-            wrenches[k - 1] = wrenches[k - 1].plus(self.graph, &passed);
+        let needed = self.links.iter().zip(&motions);
+        let needed = needed.map(|(link, motion)| link.needed(self.graph, motion));
+        let mut wrenches: Vec<Wrench> = needed.collect();
+        for (k, link) in self.links.iter().enumerate().rev() {
+            if let Some(parent) = link.parent {
+                let passed = link.passed_on(self.graph, &wrenches[k]);
+                wrenches[parent] = wrenches[parent].plus(self.graph, &passed);
+            }
         }
         let mut torques = vec![zero[0]; self.joints];
         for (link, wrench) in self.links.iter().zip(&wrenches) {
@@ -154,17 +163,20 @@ impl<'g> Links<'g> {
 
     /// The potential energy, J: zero at the world's origin.
     pub fn potential(&mut self) -> Node {
-        let mut upwards = self.upwards;
-        let mut height = self.graph.constant(0.0);
-        let mut sum = self.graph.constant(0.0);
+        // Height of each link's origin, and the acceleration against gravity in its axes.
+        let ground = (self.graph.constant(0.0), self.upwards);
+        let mut places: Vec<(Node, Vector)> = Vec::with_capacity(self.links.len());
+        let mut sum = ground.0;
         for link in &self.links {
-            let step = self.graph.dot(&upwards, &link.origin);
-            height = self.graph.add(height, step);
-            upwards = link.inward(self.graph, &upwards);
+            let (height, upwards) = link.parent.map_or(&ground, |parent| &places[parent]);
+            let step = self.graph.dot(upwards, &link.origin);
+            let height = self.graph.add(*height, step);
+            let upwards = link.inward(self.graph, upwards);
             let of_origin = self.graph.mul(link.body.mass, height);
             let of_centre = self.graph.dot(&upwards, &link.body.moment);
             let both = self.graph.add(of_origin, of_centre);
             sum = self.graph.add(sum, both);
+            places.push((height, upwards));
         }
         sum
     }
@@ -173,10 +185,10 @@ impl<'g> Links<'g> {
     pub fn mass(&mut self) -> Vec<Vec<Node>> {
         let mut composite: Vec<Body<Node>> = self.links.iter().map(|link| link.body).collect();
         let mut mass = vec![vec![self.graph.constant(0.0); self.joints]; self.joints];
-        for j in (0..self.links.len()).rev() {
-            let outer = &self.links[j];
+        for (j, outer) in self.links.iter().enumerate().rev() {
             let mut wrench = outer.of_unit_acceleration(self.graph, &composite[j]);
-            for i in (0..=j).rev() {
+            let mut at = Some(j);
+            while let Some(i) = at {
                 let inner = &self.links[i];
                 let scale = self.graph.mul(inner.ratio, outer.ratio);
                 let entry = self.graph.mul(scale, inner.along_axis(&wrench));
@@ -187,13 +199,14 @@ impl<'g> Links<'g> {
                 if i < j {
                     add(outer.joint, inner.joint);
                 }
-                if i > 0 {
+                if inner.parent.is_some() {
                     wrench = inner.passed_on(self.graph, &wrench);
                 }
+                at = inner.parent;
             }
-            if j > 0 {
-                let seen = outer.seen_from_previous(self.graph, &composite[j]);
-                composite[j - 1] = sum(self.graph, &composite[j - 1], &seen);
+            if let Some(parent) = outer.parent {
+                let seen = outer.seen_from_parent(self.graph, &composite[j]);
+                composite[parent] = sum(self.graph, &composite[parent], &seen);
             }
         }
         mass
@@ -216,6 +229,7 @@ impl Link {
             turn = Some([graph.unary(Unary::Cos, q), graph.unary(Unary::Sin, q)]);
         }
         Self {
+            parent: place.parent,
             slides: place.slides,
             joint: place.joint,
             ratio,
@@ -226,7 +240,7 @@ impl Link {
         }
     }
 
-    /// A vector of the previous link in this link's axes.
+    /// A vector of the parent in this link's axes.
     fn inward(&self, graph: &mut Graph, vector: &Vector) -> Vector {
         let [x, y, z] = turned(graph, &self.fixed.transpose(), vector);
         let Some([c, s]) = self.turn else {
@@ -237,7 +251,7 @@ impl Link {
         [graph.add(cx, sy), graph.sub(cy, sx), z]
     }
 
-    /// A vector of this link in the axes of the previous one.
+    /// A vector of this link in the axes of the parent.
     fn outward(&self, graph: &mut Graph, [x, y, z]: &Vector) -> Vector {
         let mut at_zero = [*x, *y, *z];
         if let Some([c, s]) = self.turn {
@@ -248,15 +262,15 @@ impl Link {
         turned(graph, &self.fixed, &at_zero)
     }
 
-    /// The motion of this link's frame, from that of the previous link.
-    fn carried(&self, graph: &mut Graph, previous: &Motion, qd: Node, qdd: Node) -> Motion {
-        let lever = cross(graph, &previous.angular_acceleration, &self.origin);
-        let swept = cross(graph, &previous.angular, &self.origin);
-        let inwards = cross(graph, &previous.angular, &swept);
-        let at_origin = add(graph, &previous.acceleration, &lever);
+    /// The motion of this link's frame, from that of the parent's.
+    fn carried(&self, graph: &mut Graph, parent: &Motion, qd: Node, qdd: Node) -> Motion {
+        let lever = cross(graph, &parent.angular_acceleration, &self.origin);
+        let swept = cross(graph, &parent.angular, &self.origin);
+        let inwards = cross(graph, &parent.angular, &swept);
+        let at_origin = add(graph, &parent.acceleration, &lever);
         let at_origin = add(graph, &at_origin, &inwards);
         let [mut angular, mut angular_acceleration, mut acceleration] =
-            [previous.angular, previous.angular_acceleration, at_origin]
+            [parent.angular, parent.angular_acceleration, at_origin]
                 .map(|vector| self.inward(graph, &vector));
         // w x z qd
         let (xd, yd) = (graph.mul(angular[1], qd), graph.mul(angular[0], qd));
@@ -316,7 +330,7 @@ impl Link {
         }
     }
 
-    /// A wrench on this link as one on the previous link, about its origin.
+    /// A wrench on this link as one on its parent, about the parent's origin.
     fn passed_on(&self, graph: &mut Graph, wrench: &Wrench) -> Wrench {
         let force = self.outward(graph, &wrench.force);
         let moment = self.outward(graph, &wrench.moment);
@@ -336,8 +350,8 @@ impl Link {
         }
     }
 
-    /// A body that moves with this link, about the origin and along the axes of the previous one.
-    fn seen_from_previous(&self, graph: &mut Graph, body: &Body<Node>) -> Body<Node> {
+    /// A body that moves with this link, about the origin and along the axes of the parent.
+    fn seen_from_parent(&self, graph: &mut Graph, body: &Body<Node>) -> Body<Node> {
         let moment = self.outward(graph, &body.moment);
         let p = self.origin;
         let shift = scaled(graph, body.mass, &p);

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// Joints of the longest chain that is written in closed form: equations of longer chains are too long to read.
+/// Joints of the largest tree that is written in closed form: equations of longer chains are too long to read.
 pub const LONGEST_CLOSED_FORM: usize = 3;
 
 /// One function of the basis: a monomial times a cosine or a sine.

@@ -1,12 +1,12 @@
-//! The table `[chain]` of a model file: where each link sits on the previous one, what moves it, and its inertia.
+//! The table `[chain]` of a model file: which link each link sits on and where, what moves it, and its inertia.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::bodies::Bodies;
-use super::chain::{Body, Place, Pose};
 use super::reader::{FileError, Located};
 use super::sections;
 use super::tables::{ChainTable, LinkTable};
+use super::tree::{Body, Place, Pose};
 use crate::data::Joint;
 use crate::expr::Formula;
 
@@ -15,7 +15,7 @@ const PARALLEL: f64 = 1e-6;
 
 pub(super) fn bodies(chain: ChainTable<'_>, prismatic: &[bool]) -> Result<Bodies, FileError> {
     let links = chain.link;
-    let places = links.iter().map(|link| place(link, prismatic));
+    let places = (links.iter().enumerate()).map(|(k, link)| place(k, link, prismatic));
     let places: Vec<Place> = places.collect::<Result<_, _>>()?;
     let moves = |joint: &Joint| places.iter().any(|place| place.joint == *joint);
     if let Some(still) = Joint::all(prismatic.len()).find(|joint| !moves(joint)) {
@@ -29,8 +29,9 @@ pub(super) fn bodies(chain: ChainTable<'_>, prismatic: &[bool]) -> Result<Bodies
     })
 }
 
-/// `origin`, `axis` (z) and `across` (x) of the link's frame in the previous link's frame, and what moves it.
-fn place(link: &LinkTable<'_>, prismatic: &[bool]) -> Result<Place, FileError> {
+/// `origin`, `axis` (z) and `across` (x) of the frame of the link at place `k`, in the frame of the link that it sits on,
+/// and what moves it.
+fn place(k: usize, link: &LinkTable<'_>, prismatic: &[bool]) -> Result<Place, FileError> {
     let axis = direction(link, "axis", link.axis)?;
     let across = direction(link, "across", link.across)?;
     let x = across - axis * axis.dot(&across);
@@ -41,6 +42,7 @@ fn place(link: &LinkTable<'_>, prismatic: &[bool]) -> Result<Place, FileError> {
     let x = x.normalize();
     let joint = sections::joint(&link.section, link.joint, prismatic.len())?;
     Ok(Place {
+        parent: parent(k, link)?,
         pose: Pose {
             rotation: Matrix3::from_columns(&[x, axis.cross(&x), axis]),
             origin: link.origin.into(),
@@ -50,6 +52,18 @@ fn place(link: &LinkTable<'_>, prismatic: &[bool]) -> Result<Place, FileError> {
         ratio: link.ratio.unwrap_or(1.0),
         offset: link.offset.unwrap_or(0.0),
     })
+}
+
+/// The link with the number `parent`, or the one before; the base is 0.
+fn parent(k: usize, link: &LinkTable<'_>) -> Result<Option<usize>, FileError> {
+    let on = link.parent.unwrap_or(k);
+    if on > k {
+        let message = format!(
+            "`parent` must be the number of a link further up, at most {k}, or 0 for the base; found {on}"
+        );
+        return Err(link.section.error_at("parent", message));
+    }
+    Ok(on.checked_sub(1))
 }
 
 fn direction(link: &LinkTable<'_>, key: &str, given: [f64; 3]) -> Result<Vector3<f64>, FileError> {

@@ -3,8 +3,8 @@
 use nalgebra::{Complex, Matrix3, Vector3};
 
 use super::shape::{ROUNDING, SAME, beyond_rounding};
-use crate::model::chain::spatial::with_z_along;
-use crate::model::chain::{Drivetrain, Inertia, Joint, Pose};
+use crate::model::tree::spatial::with_z_along;
+use crate::model::tree::{Drivetrain, Inertia, Joint, Pose};
 
 /// A point or vector of the plane in which links turn, as z + i x with z up. A rotation by q about y multiplies it by
 /// exp(i q).
@@ -201,6 +201,7 @@ fn plain(number: usize, axis: Vector3<f64>, origin: Vector3<f64>, inertia: Inert
     Joint {
         name: format!("joint{number}"),
         body: format!("link{number}"),
+        parent: number.checked_sub(2),
         slides: false,
         pose: Pose { rotation, origin },
         reference: 0.0,

@@ -1,9 +1,9 @@
-//! The bodies of a chain for other values of its model file's parameters.
+//! The bodies of a tree for other values of its model file's parameters.
 
 use thiserror::Error;
 
 use super::bodies_text::Bodies;
-use super::body::Chain;
+use super::body::Tree;
 use super::closed_form::ClosedForm;
 use super::equations::Kind;
 use super::model_file::is_short;
@@ -11,7 +11,7 @@ use super::nearest::{Sum, nearest};
 use super::spatial::{Inertia, PARTS, Parts};
 use crate::data;
 
-/// Why a chain has no bodies for the values of a model.
+/// Why a tree has no bodies for the values of a model.
 #[derive(Debug, Error)]
 pub enum ValuesError {
     #[error(
@@ -24,22 +24,22 @@ pub enum ValuesError {
     NoBodies,
 }
 
-/// For each joint, the inertia to add, in its frame, so that the parameters of the chain's model file have these
-/// values. For a short chain, whose parameters are sums, the bodies nearest to the chain's are taken.
+/// For each joint, the inertia to add, in its frame, so that the parameters of the tree's model file have these
+/// values. For a short tree, whose parameters are sums, the bodies nearest to the tree's are taken.
 ///
 /// # Errors
 /// A parameter without a value, or sums that no bodies have.
 pub fn added(
-    chain: &Chain,
+    tree: &Tree,
     value: impl Fn(&str) -> Option<f64>,
 ) -> Result<Vec<Inertia>, ValuesError> {
     let value = |name: &str| value(name).ok_or_else(|| ValuesError::Missing(name.to_owned()));
-    let now = parts_of(chain);
-    let new = match is_short(chain) {
-        true => nearest(&now, &sums(chain, &now, value)?).ok_or(ValuesError::NoBodies)?,
+    let now = parts_of(tree);
+    let new = match is_short(tree) {
+        true => nearest(&now, &sums(tree, &now, value)?).ok_or(ValuesError::NoBodies)?,
         false => {
             let mut new = now.clone();
-            for (name, kind, joint) in Bodies(chain).parameters() {
+            for (name, kind, joint) in Bodies(tree).parameters() {
                 new[joint][kind.place()] = value(&name)?;
             }
             new
@@ -63,25 +63,25 @@ pub fn added(
 const ROUNDING: f64 = 1e-13;
 
 /// The parts of the body of each joint.
-fn parts_of(chain: &Chain) -> Vec<Parts> {
-    let joints = chain.joints.iter();
+fn parts_of(tree: &Tree) -> Vec<Parts> {
+    let joints = tree.joints.iter();
     joints
         .map(|joint| Kind::OF_BODY.map(|kind| kind.value(joint)))
         .collect()
 }
 
-/// The sums that make up the parameters of a short chain. A part that is zero in the file is in no sum and stays zero.
+/// The sums that make up the parameters of a short tree. A part that is zero in the file is in no sum and stays zero.
 fn sums(
-    chain: &Chain,
+    tree: &Tree,
     now: &[Parts],
     value: impl Fn(&str) -> Result<f64, ValuesError>,
 ) -> Result<Vec<Sum>, ValuesError> {
-    let closed = ClosedForm::of(chain);
+    let closed = ClosedForm::of(tree);
     let sum = |(name, parts): (&str, Vec<(f64, Kind, data::Joint)>)| {
         let is_rotor = |(_, kind, _): &&(f64, Kind, data::Joint)| *kind == Kind::Rotor;
         let rotors = parts.iter().filter(is_rotor);
         let of_rotors: f64 = rotors
-            .map(|(factor, kind, joint)| factor * kind.value(&chain.joints[*joint]))
+            .map(|(factor, kind, joint)| factor * kind.value(&tree.joints[*joint]))
             .sum();
         let bodies = parts.iter().filter(|part| !is_rotor(part));
         Ok(Sum {

@@ -43,22 +43,24 @@ pub struct Servo {
 /// How a joint follows another: its coordinate is `ratio * q + offset`, with the leader's q.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Follows {
-    /// Index of the leader among the joints of the chain.
+    /// Index of the leader among the joints of the tree.
     pub leader: usize,
     pub ratio: f64,
     /// rad or m
     pub offset: f64,
 }
 
-/// One joint of a serial chain, with everything that moves with it up to the next joint.
+/// One joint of a tree, with everything that moves with it up to the next joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
     pub name: String,
     /// Name of the body that the joint moves.
     pub body: String,
+    /// Index of the joint that carries it, which comes before it; `None` for one on the base.
+    pub parent: Option<usize>,
     /// Whether it slides along its axis rather than turning about it.
     pub slides: bool,
-    /// The joint's frame in that of the previous joint (or the world) at coordinate `reference`; z is the joint's axis.
+    /// The joint's frame in that of its parent (or the world) at coordinate `reference`; z is the joint's axis.
     pub pose: Pose,
     /// rad or m
     pub reference: f64,
@@ -70,7 +72,7 @@ pub struct Joint {
     pub anchor: Vector3<f64>,
     /// In the joint's frame.
     pub inertia: Inertia,
-    /// The joint of the chain that it follows, if any.
+    /// The joint of the tree that it follows, if any.
     pub follows: Option<Follows>,
     pub drivetrain: Drivetrain,
 }
@@ -88,7 +90,7 @@ impl Joint {
         }
     }
 
-    /// The joint's frame in that of the previous joint (or the world) at coordinate zero.
+    /// The joint's frame in that of its parent (or the world) at coordinate zero.
     pub fn at_zero(&self) -> Pose {
         self.at(0.0)
     }
@@ -111,9 +113,10 @@ impl Joint {
     }
 }
 
-/// A serial mechanism: from 1 to [`JOINTS`](crate::limits::JOINTS) joints, each carrying the next.
+/// A mechanism on a fixed base: from 1 to [`JOINTS`](crate::limits::JOINTS) joints, each on the base or carried by one
+/// that comes before it.
 #[derive(Debug, Clone)]
-pub struct Chain {
+pub struct Tree {
     pub name: String,
     /// Acceleration, m/s^2, in the world frame.
     pub gravity: Vector3<f64>,
@@ -124,7 +127,7 @@ pub struct Chain {
     pub notes: Vec<String>,
 }
 
-impl Chain {
+impl Tree {
     /// The joints that follow no other, with their numbers.
     pub fn leaders(&self) -> impl Iterator<Item = (data::Joint, &Joint)> {
         let leaders = self.joints.iter().filter(|joint| joint.follows.is_none());
@@ -133,7 +136,7 @@ impl Chain {
             .map(|(k, joint)| (data::Joint::at(k), joint))
     }
 
-    /// The chain with this drive at every joint. A note names the joints whose limit nobody has given.
+    /// The tree with this drive at every joint. A note names the joints whose limit nobody has given.
     #[must_use]
     pub fn driven_by(mut self, drive: ReadyDrive) -> Self {
         let is_open = |joint: &&Joint| joint.drivetrain.effort.is_none() && joint.follows.is_none();
@@ -149,7 +152,7 @@ impl Chain {
         self
     }
 
-    /// The chain without damping, dry friction and rotors. A note has the values that are left out.
+    /// The tree without damping, dry friction and rotors. A note has the values that are left out.
     #[must_use]
     pub fn with_bare_joints(mut self) -> Self {
         for joint in &mut self.joints {
@@ -182,6 +185,7 @@ pub(super) fn places(joints: &[Joint]) -> Vec<Place> {
             offset: 0.0,
         });
         Place {
+            parent: joint.parent,
             pose: joint.at_zero(),
             slides: joint.slides,
             joint: number(follows.leader),

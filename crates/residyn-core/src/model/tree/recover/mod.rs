@@ -24,13 +24,14 @@ pub struct Recovered {
 }
 
 impl Recovered {
-    /// A chain as it is, turned so that gravity (m/s^2, in the axes of the world) acts against z.
-    pub fn of_chain(places: &[Place], bodies: &[Inertia], gravity: Vector3<f64>) -> Self {
+    /// A tree as it is, turned so that gravity (m/s^2, in the axes of the world) acts against z.
+    pub fn of_tree(places: &[Place], bodies: &[Inertia], gravity: Vector3<f64>) -> Self {
         let links = places.iter().zip(bodies).enumerate();
         let mut joints: Vec<Joint> = links
             .map(|(k, (place, inertia))| Joint {
                 name: format!("joint{}", k + 1),
                 body: format!("link{}", k + 1),
+                parent: place.parent,
                 slides: place.slides,
                 pose: place.pose,
                 reference: 0.0,
@@ -42,13 +43,12 @@ impl Recovered {
                 drivetrain: Drivetrain::default(),
             })
             .collect();
-        if let Some(first) = joints.first_mut() {
-            let level = Pose {
-                rotation: downwards(gravity),
-                origin: Vector3::zeros(),
-            };
-            first.pose = level.then(&first.pose);
-        }
+        let level = Pose {
+            rotation: downwards(gravity),
+            origin: Vector3::zeros(),
+        };
+        let on_base = joints.iter_mut().filter(|joint| joint.parent.is_none());
+        on_base.for_each(|joint| joint.pose = level.then(&joint.pose));
         Self {
             joints,
             gravity: gravity.norm(),
@@ -117,7 +117,7 @@ fn gravity(declared: &Dynamics) -> f64 {
     own.map_or(GRAVITY, |p| p.value)
 }
 
-/// Joints given in the world frame as joints of a chain, turned so that gravity acts against z. Gravity that differs
+/// Joints given in the world frame as joints of a tree, turned so that gravity acts against z. Gravity that differs
 /// from the model's by rounding is set to the model's.
 fn upright(mut joints: Vec<Joint>, downward: Planar, own: f64) -> Recovered {
     let level = Pose {

@@ -1,9 +1,9 @@
-//! The equations of motion of a short chain as formulas of a model file.
+//! The equations of motion of a short tree as formulas of a model file.
 
 use std::fmt::Write;
 
 use super::base::{Base, base_parameters};
-use super::body::{Chain, Joint};
+use super::body::{Joint, Tree};
 use super::equations::{Column, Kind, Lengths, christoffel, columns};
 use super::formula::{factors, join, number, sum};
 use super::model_file::{gravity_parameter, name, parameter, short};
@@ -15,7 +15,7 @@ const WIDTH: usize = 110;
 
 /// The equations of motion as formulas, and their base parameters.
 pub(super) struct ClosedForm<'c> {
-    chain: &'c Chain,
+    tree: &'c Tree,
     base: Vec<Base>,
     names: Vec<String>,
     lengths: Lengths,
@@ -23,19 +23,19 @@ pub(super) struct ClosedForm<'c> {
 }
 
 impl<'c> ClosedForm<'c> {
-    pub fn of(chain: &'c Chain) -> Self {
-        let base = base_parameters(columns(&chain.joints, &chain.gravity));
+    pub fn of(tree: &'c Tree) -> Self {
+        let base = base_parameters(columns(&tree.joints, &tree.gravity));
         let (rotors, base): (Vec<Base>, Vec<Base>) = base
             .into_iter()
             .partition(|base| base.column.kind == Kind::Rotor);
         Self {
-            chain,
+            tree,
             names: base
                 .iter()
                 .map(|b| name(b.column.kind, b.column.joint))
                 .collect(),
             base,
-            lengths: Lengths::of(&chain.joints),
+            lengths: Lengths::of(&tree.joints),
             rotors,
         }
     }
@@ -66,18 +66,18 @@ impl<'c> ClosedForm<'c> {
     }
 
     fn joints(&self) -> usize {
-        self.chain.joints.len()
+        self.tree.joints.len()
     }
 
     fn parameters(&self) -> String {
         let mut text = "\n[parameters]\n".to_owned();
         for base in &self.base {
             let Column { kind, joint, .. } = base.column;
-            let about = about(base, &self.chain.joints[joint]);
+            let about = about(base, &self.tree.joints[joint]);
             text += &parameter(kind, joint, base.value, base.is_positive(), &about);
         }
         if self.has_gravity() {
-            text += &gravity_parameter(self.chain);
+            text += &gravity_parameter(self.tree);
         }
         text
     }

@@ -1,0 +1,226 @@
+//! A search limb by limb: joints of one limb do not move those of another, so that each limb is a smaller problem of its
+//! own.
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::diagnostics::diagnose;
+use super::error::StudyError;
+use super::error_model::ErrorModel;
+use super::establish::{Chosen, Standing};
+use super::fit::Declared;
+use super::fitted::Fitted;
+use super::gravity::shares_of_gravity;
+use super::judge::{Found, mark};
+use super::pipeline::find;
+use super::plainer::Unused;
+use super::problem::Problem;
+use super::select::{Rival, Round, Tried};
+use super::stage::Watch;
+use crate::data::{Audit, Joint, Log};
+use crate::identify::{FitError, as_it_stands};
+use crate::model::{FittedEffect, Model};
+
+/// As [`find`], limb by limb; `None` if there is only one limb, or motion is compared, in which all joints are one part.
+pub(super) fn find_in_limbs<'a>(
+    declared: &Declared<'a>,
+    apart: &[Log],
+    rng: &mut impl Rng,
+    watch: &dyn Watch,
+) -> Result<Option<Found<'a>>, StudyError> {
+    let problem = &declared.problem;
+    let joints = problem.declared.limbs();
+    if joints.len() == 1 || problem.error_model == ErrorModel::OutputError {
+        return Ok(None);
+    }
+    let limb = |joints| Limb::of(problem, apart, joints);
+    let limbs: Vec<Limb> = joints.into_iter().map(limb).collect();
+    // The same draws for each limb: no result depends on their order.
+    let seed = rng.random();
+    let found = limbs.par_iter().map(|limb| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        limb.find(problem, &mut rng, watch)
+    });
+    let found: Vec<Found<'_>> = found.collect::<Result<_, StudyError>>()?;
+    let whole = Whole {
+        declared,
+        limbs: limbs.iter().zip(&found).collect(),
+    };
+    let chosen = whole.chosen()?;
+    let before = declared.fitted.clone();
+    Ok(Some(Found {
+        unexplained: diagnose(problem, &before, &chosen.after, rng),
+        problem: problem.knowing(problem.identifiability_of(&chosen.after)),
+        gravity: shares_of_gravity(problem),
+        before,
+        chosen,
+    }))
+}
+
+/// A limb, and what the logs hold of it.
+struct Limb {
+    joints: Vec<Joint>,
+    model: Model,
+    logs: Vec<Log>,
+    audits: Vec<Audit>,
+    apart: Vec<Log>,
+}
+
+impl Limb {
+    fn of(problem: &Problem<'_>, apart: &[Log], joints: Vec<Joint>) -> Self {
+        let own = |logs: &[Log]| logs.iter().map(|log| log.of_joints(&joints)).collect();
+        Self {
+            model: problem.declared.limb(&joints),
+            logs: own(problem.logs),
+            apart: own(apart),
+            audits: (problem.audits().iter())
+                .map(|audit| audit.of_joints(&joints))
+                .collect(),
+            joints,
+        }
+    }
+
+    /// What the limb lacks.
+    fn find<'l>(
+        &'l self,
+        whole: &'l Problem<'_>,
+        rng: &mut impl Rng,
+        watch: &dyn Watch,
+    ) -> Result<Found<'l>, StudyError> {
+        let logs = (self.logs.as_slice(), self.audits.clone());
+        let (model, library, settings) = (&self.model, whole.library, whole.settings);
+        let problem = Problem {
+            solver: whole.solver,
+            ..Problem::audited(model, library, whole.error_model, logs, settings)
+        };
+        find(problem.fit_declared()?, &self.apart, rng, watch)
+    }
+
+    fn of_whole(&self, effect: &FittedEffect) -> FittedEffect {
+        effect.on(self.joints[effect.joint])
+    }
+
+    /// Write the declared part of a fitted limb into the whole; its added effects are returned.
+    fn put_into(&self, whole: &mut Model, limb: &Model) -> Vec<FittedEffect> {
+        let free = (self.model.parameters.iter()).map(|declared| !declared.fixed);
+        for ((own, found), free) in whole.parameters.iter_mut().zip(&limb.parameters).zip(free) {
+            if free {
+                own.clone_from(found);
+            }
+        }
+        let mut effects = limb.effects.iter().map(|effect| self.of_whole(effect));
+        let declared = whole.effects.iter_mut();
+        let declared = declared.filter(|effect| self.joints.contains(&effect.joint));
+        for (place, found) in declared.zip(effects.by_ref()) {
+            *place = found;
+        }
+        effects.collect()
+    }
+
+    fn round_of_whole(&self, round: &Round) -> Round {
+        let tried = round.tried.iter().map(|tried| Tried {
+            effects: (tried.effects.iter())
+                .map(|effect| self.of_whole(effect))
+                .collect(),
+            ..*tried
+        });
+        Round {
+            candidates: round.candidates,
+            tried: tried.collect(),
+        }
+    }
+}
+
+/// What was found in all limbs, as an answer about the whole.
+struct Whole<'w, 'a> {
+    declared: &'w Declared<'a>,
+    limbs: Vec<(&'w Limb, &'w Found<'w>)>,
+}
+
+impl Whole<'_, '_> {
+    fn chosen(&self) -> Result<Chosen, FitError> {
+        let problem = &self.declared.problem;
+        let model = self.with(None);
+        let start_states = problem.shooting.initial_start_states(0);
+        let after = problem.refit(&model, start_states, None)?;
+        let mut chosen = Chosen {
+            after,
+            standings: Vec::new(),
+            rounds: Vec::new(),
+            stopped: false,
+            rivals: Vec::new(),
+            unused: Vec::new(),
+            failure: None,
+        };
+        for (k, (limb, found)) in self.limbs.iter().enumerate() {
+            let own = &found.chosen;
+            let standings = own.standings.par_iter();
+            let standings = standings.map(|standing| self.standing(k, standing, &chosen.after));
+            let standings: Vec<Standing> = standings.collect();
+            chosen.standings.extend(standings);
+            let rivals = own.rivals.par_iter();
+            let rivals = rivals.map(|rival| self.rival(k, rival, &chosen.after));
+            let rivals: Vec<Rival> = rivals.collect::<Result<_, FitError>>()?;
+            chosen.rivals.extend(rivals);
+            chosen
+                .rounds
+                .extend(own.rounds.iter().map(|round| limb.round_of_whole(round)));
+            chosen.stopped |= own.stopped;
+            let unused = own.unused.iter().map(|unused| Unused {
+                effect: unused.effect.as_ref().map(|effect| limb.of_whole(effect)),
+                ..unused.clone()
+            });
+            chosen.unused.extend(unused);
+            chosen.failure = chosen.failure.or_else(|| own.failure.clone());
+        }
+        mark(&mut chosen.after.model, &chosen.standings);
+        Ok(chosen)
+    }
+
+    /// The whole with what was found in each limb; with another model of limb `other`, if there is one.
+    fn with(&self, other: Option<(usize, &Model)>) -> Model {
+        let mut whole = self.declared.fitted.model.clone();
+        let mut added = Vec::new();
+        for (k, (limb, found)) in self.limbs.iter().enumerate() {
+            let model = other.filter(|(other, _)| *other == k);
+            let model = model.map_or(&found.chosen.after.model, |(_, model)| model);
+            added.extend(limb.put_into(&mut whole, model));
+        }
+        let effects = [whole.effects.as_slice(), &added].concat();
+        whole.with_effects(effects)
+    }
+
+    /// The whole with another model of limb `k`, at the scale of the chosen one.
+    fn other(&self, k: usize, other: &Fitted, after: &Fitted) -> Result<Fitted, FitError> {
+        let problem = &self.declared.problem;
+        let model = problem.smoothed(&self.with(Some((k, &other.model))));
+        let dynamics = problem.compiled(&model);
+        let active = problem.active(&dynamics);
+        let start_states = after.fit.start_states.clone();
+        let scale = after.fit.scale;
+        let fit = as_it_stands(&problem.shooting, &dynamics, &active, start_states, scale)?;
+        Ok(Fitted { model, fit })
+    }
+
+    fn standing(&self, k: usize, standing: &Standing, after: &Fitted) -> Standing {
+        let without = standing.without.as_ref();
+        Standing {
+            effect: self.limbs[k].0.of_whole(&standing.effect),
+            without: without
+                .map_err(Clone::clone)
+                .and_then(|without| self.other(k, without, after)),
+            ..standing.clone()
+        }
+    }
+
+    fn rival(&self, k: usize, rival: &Rival, after: &Fitted) -> Result<Rival, FitError> {
+        let limb = self.limbs[k].0;
+        Ok(Rival {
+            fitted: self.other(k, &rival.fitted, after)?,
+            effect: limb.of_whole(&rival.effect),
+            instead_of: limb.of_whole(&rival.instead_of),
+            ..*rival
+        })
+    }
+}
