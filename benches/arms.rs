@@ -49,16 +49,16 @@ fn chain(joints: usize) -> Model {
         follows: None,
         drivetrain: Drivetrain::default(),
     };
-    let tree = Tree {
-        name: format!("tree of {joints}"),
+    let chain = Tree {
+        name: format!("chain of {joints}"),
         gravity: Vector3::new(0.0, 0.0, -9.81),
         joints: (0..joints).map(joint).collect(),
         drive: None,
         notes: Vec::new(),
     };
     let library = Library::built_in();
-    let text = model_text(&tree);
-    Model::from_text(Path::new("tree.toml"), &text, library.effects()).expect("a tree")
+    let text = model_text(&chain);
+    Model::from_text(Path::new("chain.toml"), &text, library.effects()).expect("a chain")
 }
 
 /// Nanoseconds per state; inputs from `held` on are parameters with these values.
@@ -84,7 +84,7 @@ fn nanoseconds<T: Element, const W: usize>(program: &Program, held: usize, value
 
 fn tell(model: &Model, called: &serde_json::Value) {
     let joints = model.joints;
-    let inverse = model.torque_balance().expect("a tree has torques");
+    let inverse = model.torque_balance().expect("a chain has torques");
     let forward = model.dynamics();
     for (what, dynamics, held) in [
         ("inverse", &inverse, 4 * joints + 1),

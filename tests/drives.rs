@@ -16,30 +16,64 @@ use crate::support::reports::estimate;
 use crate::support::tables::{rows, says_words};
 use crate::support::{Scratch, mechanisms, says};
 
-/// A pendulum arm on two position servos, as drawn or as built. Friction there stiffens within half a millisecond: by
-/// default MuJoCo's acts some ten milliseconds ahead of the velocity.
-fn arm(shoulder: &str, elbow: &str) -> String {
-    format!(
-        r#"<mujoco model="servo arm">
-  <compiler angle="radian"/>
-  <option timestep="0.00005"/>
-  <worldbody>
-    <body name="upper" pos="0 0 1">
-      <joint name="shoulder" axis="0 1 0" damping="0.3" {shoulder}/>
+/// A limb of two links and its joints: their names, where it hangs, and what the joints have beyond the drawing.
+struct Limb<'a> {
+    links: [&'a str; 2],
+    joints: [&'a str; 2],
+    place: &'a str,
+    beyond: [&'a str; 2],
+}
+
+/// Limbs on a fixed base, each on two position servos, as drawn or as built. Friction there stiffens within half a
+/// millisecond: by default MuJoCo's acts some ten milliseconds ahead of the velocity.
+fn machine(name: &str, limbs: &[Limb<'_>]) -> String {
+    let bodies = limbs.iter().map(|limb| {
+        let ([upper, fore], [inner, outer]) = (limb.links, limb.joints);
+        let (place, [on_inner, on_outer]) = (limb.place, limb.beyond);
+        format!(
+            r#"
+    <body name="{upper}" pos="{place}">
+      <joint name="{inner}" axis="0 1 0" damping="0.3" {on_inner}/>
       <inertial pos="0 0 -0.15" mass="0.8" diaginertia="0.007 0.007 0.0005"/>
-      <body name="fore" pos="0 0 -0.3">
-        <joint name="elbow" axis="0 1 0" {elbow}/>
+      <body name="{fore}" pos="0 0 -0.3">
+        <joint name="{outer}" axis="0 1 0" {on_outer}/>
         <inertial pos="0 0 -0.12" mass="0.4" diaginertia="0.0025 0.0025 0.0002"/>
       </body>
-    </body>
+    </body>"#
+        )
+    });
+    let servos = limbs.iter().map(|limb| {
+        let [inner, outer] = limb.joints;
+        format!(
+            r#"
+    <position name="{inner}" joint="{inner}" kp="60" kv="2" forcerange="-12 12"/>
+    <position name="{outer}" joint="{outer}" kp="25" kv="0.8" forcerange="-5 5"/>"#
+        )
+    });
+    format!(
+        r#"<mujoco model="{name}">
+  <compiler angle="radian"/>
+  <option timestep="0.00005"/>
+  <worldbody>{}
   </worldbody>
-  <actuator>
-    <position name="shoulder" joint="shoulder" kp="60" kv="2" forcerange="-12 12"/>
-    <position name="elbow" joint="elbow" kp="25" kv="0.8" forcerange="-5 5"/>
+  <actuator>{}
   </actuator>
 </mujoco>
-"#
+"#,
+        bodies.collect::<String>(),
+        servos.collect::<String>()
     )
+}
+
+/// A pendulum arm.
+fn arm(shoulder: &str, elbow: &str) -> String {
+    let limb = Limb {
+        links: ["upper", "fore"],
+        joints: ["shoulder", "elbow"],
+        place: "0 0 1",
+        beyond: [shoulder, elbow],
+    };
+    machine("servo arm", &[limb])
 }
 
 /// The effect that the report found on a joint: value and 95 % interval of its first parameter.
@@ -345,45 +379,22 @@ mod slow {
         assert!(holds(estimate, 0.061 + 0.02), "{estimate:?}");
     }
 
-    /// A machine with two legs on a fixed base, each with the arm's links and drives.
     fn legs(left: [&str; 2], right: [&str; 2]) -> String {
-        let leg = |side: &str, y: f64, [hip, knee]: [&str; 2]| {
-            format!(
-                r#"
-      <body name="{side}_thigh" pos="0 {y} 0">
-        <joint name="{side}_hip" axis="0 1 0" damping="0.3" {hip}/>
-        <inertial pos="0 0 -0.15" mass="0.8" diaginertia="0.007 0.007 0.0005"/>
-        <body name="{side}_shank" pos="0 0 -0.3">
-          <joint name="{side}_knee" axis="0 1 0" {knee}/>
-          <inertial pos="0 0 -0.12" mass="0.4" diaginertia="0.0025 0.0025 0.0002"/>
-        </body>
-      </body>"#
-            )
-        };
-        let drive = |side: &str| {
-            format!(
-                r#"
-    <position joint="{side}_hip" kp="60" kv="2" forcerange="-12 12"/>
-    <position joint="{side}_knee" kp="25" kv="0.8" forcerange="-5 5"/>"#
-            )
-        };
-        format!(
-            r#"<mujoco model="two legs">
-  <compiler angle="radian"/>
-  <option timestep="0.00005"/>
-  <worldbody>
-    <body name="trunk" pos="0 0 1">{}{}
-    </body>
-  </worldbody>
-  <actuator>{}{}
-  </actuator>
-</mujoco>
-"#,
-            leg("left", 0.1, left),
-            leg("right", -0.1, right),
-            drive("left"),
-            drive("right")
-        )
+        let legs = [
+            Limb {
+                links: ["left_thigh", "left_shank"],
+                joints: ["left_hip", "left_knee"],
+                place: "0 0.1 1",
+                beyond: left,
+            },
+            Limb {
+                links: ["right_thigh", "right_shank"],
+                joints: ["right_hip", "right_knee"],
+                place: "0 -0.1 1",
+                beyond: right,
+            },
+        ];
+        machine("two legs", &legs)
     }
 
     /// Targets of four joints, without a torque: what the law of the drives asks for is compared, leg by leg, and the motion

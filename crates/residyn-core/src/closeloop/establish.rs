@@ -65,6 +65,19 @@ pub struct Chosen {
 }
 
 impl Chosen {
+    /// A model, with nothing said of effects.
+    pub(super) fn of(after: Fitted) -> Self {
+        Self {
+            after,
+            standings: Vec::new(),
+            rounds: Vec::new(),
+            stopped: false,
+            rivals: Vec::new(),
+            unused: Vec::new(),
+            failure: None,
+        }
+    }
+
     /// Number of established effects.
     pub fn established(&self) -> usize {
         self.named().count()
@@ -86,13 +99,9 @@ pub fn establish(
     watch: &dyn Watch,
 ) -> Chosen {
     let none = Chosen {
-        after: before.clone(),
-        standings: Vec::new(),
         rounds: selected.rounds,
         stopped: selected.stopped,
-        rivals: Vec::new(),
-        unused: Vec::new(),
-        failure: None,
+        ..Chosen::of(before.clone())
     };
     let chosen = match selected.chosen {
         Ok(chosen) => chosen,

@@ -58,11 +58,7 @@ pub(super) fn shares_of_gravity(problem: &Problem<'_>) -> Vec<Option<f64>> {
     }
     let bodies = problem.declared.without_drive().with_effects(Vec::new());
     let of_log = |log| {
-        let smooth = Smooth::of(log);
-        let smooth = Smooth {
-            tau: problem.declared.smooth_drive_torques(&smooth),
-            ..smooth
-        };
+        let smooth = problem.declared.with_drive_torques(Smooth::of(log));
         share(&bodies, &smooth, &problem.settings.notes)
     };
     problem.logs.iter().map(of_log).collect()

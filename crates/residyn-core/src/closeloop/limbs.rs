@@ -143,16 +143,7 @@ impl Whole<'_, '_> {
         let problem = &self.declared.problem;
         let model = self.with(None);
         let start_states = problem.shooting.initial_start_states(0);
-        let after = problem.refit(&model, start_states, None)?;
-        let mut chosen = Chosen {
-            after,
-            standings: Vec::new(),
-            rounds: Vec::new(),
-            stopped: false,
-            rivals: Vec::new(),
-            unused: Vec::new(),
-            failure: None,
-        };
+        let mut chosen = Chosen::of(problem.refit(&model, start_states, None)?);
         for (k, (limb, found)) in self.limbs.iter().enumerate() {
             let own = &found.chosen;
             let standings = own.standings.par_iter();

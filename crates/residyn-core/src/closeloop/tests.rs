@@ -262,13 +262,8 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     let effect = chosen.model.effects[0].clone();
     let standing = Standing::sure(effect, (1.0, 0.0), problem.without_effect(&chosen, 0));
     let chosen = Chosen {
-        after: chosen,
         standings: vec![standing],
-        rounds: Vec::new(),
-        stopped: false,
-        rivals: Vec::new(),
-        unused: Vec::new(),
-        failure: None,
+        ..Chosen::of(chosen)
     };
     let found = findings(&problem, &chosen, &refined, &scorer);
     assert_eq!(found.len(), 1);

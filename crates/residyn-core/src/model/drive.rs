@@ -36,11 +36,6 @@ impl Drive {
         &self.0
     }
 
-    /// The formulas, each with its joint.
-    pub fn formulas_by_joint(&self) -> impl Iterator<Item = (Joint, &Located<Formula>)> {
-        Joint::all(self.0.len()).zip(&self.0)
-    }
-
     /// The drives of these joints alone, in the names of joints that are numbered from 1.
     pub fn limb(&self, joints: &[Joint]) -> Self {
         let renamed = |name: &str| {
@@ -93,11 +88,12 @@ impl Model {
         self.drive_torques_along(&channels)
     }
 
-    /// The same along a smoothed log.
-    pub fn smooth_drive_torques(&self, smooth: &Smooth) -> Vec<Vec<f64>> {
+    /// A smoothed log with the same torques in place of its commands.
+    pub fn with_drive_torques(&self, smooth: Smooth) -> Smooth {
         let channels = smooth.q.iter().chain(&smooth.qd).chain(&smooth.tau);
         let channels = channels.chain([&smooth.time]).map(Vec::as_slice);
-        self.drive_torques_along(&channels.collect::<Vec<_>>())
+        let tau = self.drive_torques_along(&channels.collect::<Vec<_>>());
+        Smooth { tau, ..smooth }
     }
 
     /// The same along positions, velocities, commands and time.

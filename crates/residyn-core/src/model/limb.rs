@@ -88,14 +88,10 @@ impl Model {
             Motion::Tree(bodies) => bodies.formulas_of(joints).collect(),
             other => other.formulas().collect(),
         };
-        let of_drives = self
-            .equations
-            .drive
-            .iter()
-            .flat_map(Drive::formulas_by_joint);
-        let of_drives = of_drives.filter(|(joint, _)| joints.contains(joint));
+        let drives = self.equations.drive.iter().map(Drive::formulas);
+        let of_drives = drives.flat_map(|drives| joints.iter().map(|joint| &drives[*joint]));
         let mut formulas: Vec<&Formula> = of_bodies.iter().map(|formula| &formula.value).collect();
-        formulas.extend(of_drives.map(|(_, formula)| &formula.value));
+        formulas.extend(of_drives.map(|formula| &formula.value));
         let mut names: BTreeSet<&str> = formulas.iter().flat_map(|f| f.names()).collect();
         // Intermediates may mention those before them.
         for (name, formula) in self.equations.lets.iter().rev() {

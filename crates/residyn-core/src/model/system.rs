@@ -309,7 +309,7 @@ impl Model {
     fn couples(&self, joint: Joint) -> bool {
         let next = joint.next();
         let is_carried = match &self.equations.motion {
-            Motion::Tree(bodies) => next.is_of(self.joints) && bodies.carries(joint, next),
+            Motion::Tree(bodies) => bodies.carries(joint, next),
             _ => next.is_of(self.joints),
         };
         is_carried && self.prismatic[joint] == self.prismatic[next]

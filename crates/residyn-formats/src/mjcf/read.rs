@@ -53,10 +53,13 @@ const JOINT: &str = "\
     damping frictionloss user";
 /// Attributes of a body that are read here or have no effect.
 const BODY: &str = "name childclass pos quat axisangle euler xyaxes zaxis mocap user sleep";
-/// The type of a joint with which a body floats.
-const FREE: &str = "free";
 /// Flags that switch off joint forces.
 const FORCES: &[&str] = &["passive", "spring", "damper", "frictionloss"];
+
+/// Whether a body floats on this joint.
+fn is_free(joint: Node<'_, '_>) -> bool {
+    joint.attribute("type") == Some("free")
+}
 
 pub(super) struct Reader<'s, 'x> {
     pub source: &'s Source<'x>,
@@ -194,7 +197,7 @@ impl<'s, 'x> Reader<'s, 'x> {
         let own = self.source.element(node);
         own.note_others(BODY);
         let name = node.attribute("name").unwrap_or("body").to_owned();
-        let moving = named(node, "joint").filter(|joint| joint.attribute("type") != Some(FREE));
+        let moving = named(node, "joint").filter(|joint| !is_free(*joint));
         let joints = moving.enumerate().map(|(k, joint)| {
             let fallback = format!("{name}_joint{}", k + 1);
             self.hinge(&self.classes.element(joint, class, &["joint"])?, &fallback)
@@ -215,7 +218,7 @@ impl<'s, 'x> Reader<'s, 'x> {
     fn check_parts(&self, body: Node<'s, 'x>) -> Result<(), FileError> {
         for part in elements(body) {
             let name = part.tag_name().name();
-            if name == "freejoint" || name == "joint" && part.attribute("type") == Some(FREE) {
+            if name == "freejoint" || name == "joint" && is_free(part) {
                 let note =
                     "this body is free to move in the file; it is fixed where the file draws it";
                 self.source.note(part, note.to_owned());

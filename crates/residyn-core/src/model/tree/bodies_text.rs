@@ -42,7 +42,7 @@ impl Bodies<'_> {
         links.flat_map(|(number, _)| all(number)).collect()
     }
 
-    /// The links with their numbers along the tree, which appear in the names of their parameters.
+    /// The links with their numbers, which appear in the names of their parameters.
     fn links(&self) -> impl Iterator<Item = (data::Joint, &Joint)> {
         let joints = self.0.joints.iter().enumerate();
         joints.map(|(k, joint)| (data::Joint::at(k), joint))

@@ -1,4 +1,4 @@
-//! The equations of motion of a short tree as formulas of a model file.
+//! The equations of motion of a small tree as formulas of a model file.
 
 use std::fmt::Write;
 

@@ -1,6 +1,6 @@
 //! The equations of motion of a tree, M(q) qdd + h(q, qd) + g dV/dq = tau, linear in the physical parameters.
 //!
-//! Velocities are propagated along the tree as Jacobians (the share of each joint), in the axes of each link. The
+//! Velocities are propagated from link to link as Jacobians (the share of each joint), in the axes of each link. The
 //! contribution of one unit of a parameter to the mass matrix and to the potential is then a sum of products.
 
 use nalgebra::{Matrix3, Vector3};
@@ -290,7 +290,7 @@ fn turned(by: &Matrix3<f64>, vector: &Vector) -> Vector {
     })
 }
 
-/// Typical magnitudes of coefficients: a power of the tree's length, by unit.
+/// Typical magnitudes of coefficients: a power of the links' length, by unit.
 #[derive(Debug, Clone)]
 pub(super) struct Lengths {
     /// m

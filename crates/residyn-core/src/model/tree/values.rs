@@ -25,7 +25,7 @@ pub enum ValuesError {
 }
 
 /// For each joint, the inertia to add, in its frame, so that the parameters of the tree's model file have these
-/// values. For a short tree, whose parameters are sums, the bodies nearest to the tree's are taken.
+/// values. For a small tree, whose parameters are sums, the bodies nearest to the tree's are taken.
 ///
 /// # Errors
 /// A parameter without a value, or sums that no bodies have.
@@ -70,7 +70,7 @@ fn parts_of(tree: &Tree) -> Vec<Parts> {
         .collect()
 }
 
-/// The sums that make up the parameters of a short tree. A part that is zero in the file is in no sum and stays zero.
+/// The sums that make up the parameters of a small tree. A part that is zero in the file is in no sum and stays zero.
 fn sums(
     tree: &Tree,
     now: &[Parts],
