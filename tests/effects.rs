@@ -131,6 +131,7 @@ fn friction_opposes_the_motion() {
         "asymmetric_friction",
         "quadratic_drag",
         "load_friction",
+        "angle_friction",
     ];
     for name in frictions {
         let effect = library.effect(name).unwrap();

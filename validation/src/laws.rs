@@ -51,6 +51,9 @@ pub const DRY: &[Entry] = &[
         if at.direction > 0.0 { n[0] } else { n[1] }
     }),
     ("load_friction", &["k"], |n, at| n[0] * at.load.abs()),
+    ("angle_friction", &["F_0", "c"], |n, at| {
+        (n[0] + n[1] * at.q).max(0.0)
+    }),
     ("uneven_friction", &["F", "a"], |n, at| {
         n[0] * (1.0 + n[1] * at.q.sin())
     }),

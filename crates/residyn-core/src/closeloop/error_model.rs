@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::Log;
 use crate::identify::{Shooting, Window};
-use crate::model::{Dynamics, Effect, Entry, Model};
+use crate::model::{Dynamics, Effect, Entry, Model, ShowsIn};
 
 /// The errors that fits minimise, effects are selected by and the report compares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -18,12 +18,11 @@ pub enum ErrorModel {
 }
 
 impl ErrorModel {
-    /// Whether these errors can show an effect. In a motion, in which each joint moves the others, a motor between two
-    /// joints is too much like the links' inertia. Torques are computed from the motion as it was read, and the torque
+    /// Whether these errors can show an effect. Torques are computed from the motion as it was read, and the torque
     /// that acts must determine the command: an effect that explains any command would always fit.
     pub(super) fn shows(self, effect: &Effect) -> bool {
         match self {
-            Self::OutputError => !effect.is_coupling(),
+            Self::OutputError => effect.shows_in == ShowsIn::Any,
             Self::InverseDynamics => {
                 !matches!(effect.entry, Entry::Reading(_)) && effect.distinguishes_command()
             }

@@ -53,6 +53,8 @@ pub struct Chosen {
     pub after: Fitted,
     /// One for each added effect, in the order of the model.
     pub standings: Vec<Standing>,
+    /// The model with what it needs of the effects that most machines have, see [`Selected`].
+    pub(super) usual: Option<Fitted>,
     pub rounds: Vec<Round>,
     /// Whether the search was stopped because its time ran out.
     pub stopped: bool,
@@ -70,6 +72,7 @@ impl Chosen {
         Self {
             after,
             standings: Vec::new(),
+            usual: None,
             rounds: Vec::new(),
             stopped: false,
             rivals: Vec::new(),
@@ -99,6 +102,7 @@ pub fn establish(
     watch: &dyn Watch,
 ) -> Chosen {
     let none = Chosen {
+        usual: selected.usual,
         rounds: selected.rounds,
         stopped: selected.stopped,
         ..Chosen::of(before.clone())

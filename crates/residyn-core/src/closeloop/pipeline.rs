@@ -167,6 +167,7 @@ impl<'a> Searched<'a> {
         } = plainer(problem, fitted, &self.chosen, apart)?;
         let selected = Selected {
             chosen: Ok(Trial::of(problem, plain)),
+            usual: self.chosen.usual.clone(),
             rounds: self.chosen.rounds.clone(),
             stopped: self.chosen.stopped,
         };

@@ -41,7 +41,8 @@ impl Unused {
     }
 }
 
-/// The model without one of the chosen effects, the model with the usual friction, or the declared one, if it predicts
+/// The model without one of the chosen effects, the model with the usual friction, with the effects that most machines
+/// have, or the declared one, if it predicts
 /// whole logs better than the chosen one: those left out of a fit of the others in turn, and those set `apart`, to which
 /// nothing is fitted. The search compares short windows of logs that it knows.
 pub(super) fn plainer(
@@ -65,7 +66,9 @@ pub(super) fn plainer(
     }
     let settings = &problem.settings.select;
     let least = LeftOut::of(problem, after, apart);
-    let usual = problem.with_usual_friction();
+    let friction = problem.with_usual_friction();
+    let friction = friction.filter(|friction| !has_same_effects(friction, after));
+    let usual = chosen.usual.as_ref();
     let usual = usual.filter(|usual| !has_same_effects(usual, after));
     let whole = |fitted, of| Other {
         fitted,
@@ -73,8 +76,15 @@ pub(super) fn plainer(
         of,
         least: settings.plainer_gain,
     };
-    let others = (usual.iter()).map(|usual| whole(usual, "of the model with the usual friction"));
-    let others = others.chain([whole(declared, "of the declared model")]);
+    let others = (friction.iter())
+        .map(|friction| whole(friction, "of the model with the usual friction"))
+        .chain(usual.map(|usual| {
+            whole(
+                usual,
+                "of the model with the effects that most machines have",
+            )
+        }))
+        .chain([whole(declared, "of the declared model")]);
     // The zeros of sensors are unknown in logs that a fit has not seen.
     let of_rig =
         (chosen.standings.iter()).filter(|standing| !standing.effect.effect.is_of_sensor());

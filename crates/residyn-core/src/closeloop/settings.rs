@@ -155,7 +155,7 @@ settings! {
         /// model of many.
         most_effects: usize = 12,
         /// A set has at most this many effects per joint of the model, if that is more than `most_effects`.
-        most_effects_per_joint: usize = 4,
+        most_effects_per_joint: usize = 6,
         /// A plainer model takes the place of the chosen one if its error on whole logs that the fit has not seen is lower
         /// by this share: less is chance.
         plainer_gain: f64 = 0.02,

@@ -158,6 +158,7 @@ fn an_effect_that_saves_little_is_not_established() {
     let start_states = problem.shooting.initial_start_states(0);
     let fitted = problem.refit(&start, start_states, None).unwrap();
     let selected = Selected {
+        usual: None,
         chosen: Ok(Trial::of(&problem, fitted.clone())),
         rounds: Vec::new(),
         stopped: false,

@@ -36,11 +36,11 @@ mod together;
 pub(crate) mod torque_column;
 mod trajectory;
 
-pub(crate) use audit::reversed_driving;
 pub use audit::{
     Audit, Channel, Finding, JointAudit, MAX_LAG_S, Remedy, Repeated, Response, Severity,
     TorqueDemand, TorqueLag, VelocityCheck, audit, audit_together, report_repeats,
 };
+pub(crate) use audit::{moves_as_one, reversed_driving};
 pub use channels::Channels;
 pub use column::{Column, Quantity};
 pub use columns::Columns;

@@ -62,7 +62,7 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     let size = fit.columns.len();
     let blocks_of = blocks_of(shooting, fit, &blocks);
     // Bodies are declared within a spread, whose variance is added below.
-    let all = fit.equations().hessian + &fit.bodies.hessian;
+    let all = fit.information();
     let mut parts = fit.equations_by(&blocks);
     let count = parts.len();
     let alone: Vec<usize> = (0..size)

@@ -1,5 +1,6 @@
 use std::fmt;
 
+use nalgebra::DMatrix;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -77,6 +78,11 @@ impl Fit {
         all.gradient += &self.prior.gradient;
         all.hessian += &self.prior.hessian;
         all
+    }
+
+    /// Information on the free values: that of the logs and, of bodies, that of their declaration.
+    pub fn information(&self) -> DMatrix<f64> {
+        self.equations().hessian + &self.bodies.hessian
     }
 
     /// Largest over smallest eigenvalue of the normal equations' matrix in the free values, as they are and in units in

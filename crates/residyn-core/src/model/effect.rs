@@ -34,6 +34,7 @@ pub struct Effect {
     /// The motion that shows the effect.
     pub shown_by: String,
     pub acts_on: ActsOn,
+    pub shows_in: ShowsIn,
     /// Most machines have it, on every joint: such effects are tried together before all others, first those of rank 1,
     /// then those up to rank 2, and so on. Effects of rank 1 are also added to a model before its first fit.
     pub baseline: Option<usize>,
@@ -48,6 +49,15 @@ pub enum ActsOn {
     First,
     /// Joints that turn: the effect repeats with each turn.
     Turning,
+}
+
+/// The comparisons in which an effect is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ShowsIn {
+    #[default]
+    Any,
+    /// Of torques only: in an open-loop motion it is too much like something else.
+    Torques,
 }
 
 /// How an effect enters the equations of its joint. Formulas are in `q`, `qd`, `tau`, `load`, `t` of that joint and in

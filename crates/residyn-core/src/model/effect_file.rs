@@ -47,6 +47,7 @@ impl Effect {
             shown_by: table.shown_by.unwrap_or_default(),
             baseline: table.baseline,
             acts_on: table.joints.unwrap_or_default(),
+            shows_in: table.shows_in.unwrap_or_default(),
         })
     }
 }

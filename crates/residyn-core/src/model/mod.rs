@@ -36,7 +36,7 @@ mod written;
 
 pub use call::{Call, InputFile};
 pub use dynamics::{Dynamics, Parameter, PerLogValue};
-pub use effect::{ActsOn, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
+pub use effect::{ActsOn, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure, ShowsIn};
 pub use error::ModelError;
 pub use filter::{CommandFilter, Filter};
 pub use fitted::{FittedEffect, Status};

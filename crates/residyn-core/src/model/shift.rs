@@ -1,7 +1,7 @@
 //! Declared parameters that are held fixed although the rig may have another value.
 
 use super::Parameter;
-use super::effect::{ActsOn, Effect, EffectParameter, Entry, Measure};
+use super::effect::{ActsOn, Effect, EffectParameter, Entry, Measure, ShowsIn};
 use super::fitted::FittedEffect;
 use super::reader::Located;
 use super::system::{Model, Motion};
@@ -87,6 +87,7 @@ fn shift(k: usize, declared: &Parameter) -> Effect {
             declared.name
         ),
         acts_on: ActsOn::All,
+        shows_in: ShowsIn::Any,
         baseline: None,
     }
 }

@@ -6,6 +6,7 @@
 
 use super::effect::ActsOn;
 use super::effect::Measure;
+use super::effect::ShowsIn;
 use super::filter::CommandFilter;
 use super::reader::{Entry, FileError, Located, Section};
 use super::values::{ColumnName, EachLog, Limits, Named, OrTable, Read};
@@ -155,6 +156,7 @@ tables! {
         confused_with: Vec<String>,
         shown_by: Option<String>,
         joints: Option<ActsOn>,
+        shows_in: Option<ShowsIn>,
         valid_if: Option<Located<Formula>>,
         baseline: Option<usize>,
     }

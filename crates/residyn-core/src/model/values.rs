@@ -2,7 +2,7 @@
 
 use toml::de::DeValue;
 
-use super::effect::{ActsOn, Measure};
+use super::effect::{ActsOn, Measure, ShowsIn};
 use super::filter::CommandFilter;
 use super::fitted::Status;
 use super::reader::{Entry, FileError, Located, Section};
@@ -246,6 +246,11 @@ impl Word for ActsOn {
         ("first", Self::First),
         ("turning", Self::Turning),
     ];
+}
+
+impl Word for ShowsIn {
+    const WORDS: &'static [(&'static str, Self)] =
+        &[("any", Self::Any), ("torques", Self::Torques)];
 }
 
 impl Word for EachLog {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::equations::solve;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::data::Joint;
+use crate::data::{Joint, Quantity, moves_as_one};
 use crate::identify::{
     Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, step_within_bounds, submatrix,
 };
@@ -31,8 +31,10 @@ pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
         for joint in Joint::all(problem.declared.joints) {
             if is_driven_enough(problem, effect, joint)
                 && !is_identified_by_bodies(problem, effect)
+                && !is_turn_of_bodies(problem, effect)
                 && !is_of_too_many(problem, effect)
                 && problem.declared.can_carry(effect, joint).is_ok()
+                && !is_of_one_motion(problem, effect, joint)
             {
                 all.push(FittedEffect::absent(
                     &problem.measured(effect, joint),
@@ -48,6 +50,19 @@ pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
 /// separate stage.
 fn is_identified_by_bodies(problem: &Problem<'_>, effect: &Effect) -> bool {
     matches!(effect.entry, Entry::Payload(_)) && problem.has_free_bodies()
+}
+
+/// A motor between two joints that move as one is no different from friction and inertia of each.
+fn is_of_one_motion(problem: &Problem<'_>, effect: &Effect, joint: Joint) -> bool {
+    effect.is_coupling() && moves_as_one(problem.logs, joint, joint.next())
+}
+
+/// A drive that closes its loop on the sensor moves with the sensor's zero, which then turns only gravity: so do free
+/// bodies.
+fn is_turn_of_bodies(problem: &Problem<'_>, effect: &Effect) -> bool {
+    effect.is_of_sensor()
+        && problem.declared.driven_by() != Quantity::Torque
+        && problem.has_free_bodies()
 }
 
 /// Whether an effect has a value for each log and there are too many logs to consider it.

@@ -7,6 +7,7 @@ mod evidence;
 mod exchange;
 mod folds;
 mod identity;
+mod knowledge;
 mod losses;
 mod open_loop_check;
 mod rivals;

@@ -1,11 +1,12 @@
 use std::ops::{AddAssign, Range};
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::candidate::{beside, best_start, has_switch, screened_cost_on_sample, switches};
-use super::equations::{distinguishes, solve};
+use super::equations::solve;
 use super::folds::{Folds, predicted, step_without};
+use super::knowledge::Knowledge;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::identify::{Column, Values, WindowTerms, as_it_stands, submatrix};
@@ -31,10 +32,8 @@ pub struct Screening {
     blocks: Vec<WindowTerms>,
     groups: Vec<WindowTerms>,
     all: WindowTerms,
-    /// Information of the logs alone, without the prior.
-    information: DMatrix<f64>,
+    knowledge: Knowledge,
     /// From the settings.
-    own_information: f64,
     kept_information: f64,
 }
 
@@ -92,7 +91,6 @@ impl Screening {
         let is_base = |k: usize| !places.iter().any(|place| place.contains(&k));
         let folds = Folds::of(problem);
         let (blocks, groups) = folds.equations(&fit);
-        let settings = &problem.settings.select;
         Some(Self {
             items: model.effects[added].to_vec(),
             present,
@@ -107,9 +105,8 @@ impl Screening {
             blocks,
             groups,
             all: fit.equations_and_prior(),
-            information: fit.equations().hessian,
-            own_information: settings.own_information,
-            kept_information: settings.kept_information,
+            knowledge: Knowledge::of(problem, &model, &fit),
+            kept_information: problem.settings.select.kept_information,
         })
     }
 
@@ -167,8 +164,7 @@ impl Screening {
         }
         let mut minimum = Minimum { free, held, moved };
         let message = [&self.message, &minimum.free[self.base.len()..]].concat();
-        let information = submatrix(&self.information, &message, &message);
-        if !distinguishes(&information, self.message.len(), self.own_information) {
+        if !(self.knowledge).distinguishes(&message, self.message.len()) {
             return None;
         }
         loop {

@@ -13,6 +13,7 @@ use super::screening::Screening;
 use super::sets::descent;
 use super::simpler::{repaired, simpler};
 use super::trial::Trial;
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fit::Declared;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
@@ -42,6 +43,7 @@ pub struct Tried {
 struct Search<'a> {
     problem: &'a Problem<'a>,
     watch: &'a dyn Watch,
+    usual: Option<Fitted>,
     rounds: Vec<Round>,
     /// Exchanges that made the set worse since a round changed it: the old and the new effect.
     rejected: HashSet<[EffectId; 2]>,
@@ -60,6 +62,9 @@ struct Better {
 pub struct Selected {
     /// The model with the set, or why it could not be fitted.
     pub(in crate::closeloop) chosen: Result<Trial, FitError>,
+    /// The model with what it needs of the effects that most machines have, if torques are compared: they are fitted in
+    /// no time.
+    pub(in crate::closeloop) usual: Option<Fitted>,
     pub rounds: Vec<Round>,
     /// Whether the search was stopped early.
     pub stopped: bool,
@@ -85,6 +90,7 @@ impl<'a> Search<'a> {
         Self {
             problem,
             watch,
+            usual: None,
             rounds: Vec::new(),
             rejected: HashSet::new(),
             doing: Stage::Select.text().into(),
@@ -94,6 +100,7 @@ impl<'a> Search<'a> {
     fn end(self, chosen: Result<Trial, FitError>) -> Selected {
         Selected {
             chosen,
+            usual: self.usual,
             rounds: self.rounds,
             stopped: self.watch.has_to_end(),
         }
@@ -105,6 +112,9 @@ impl<'a> Search<'a> {
         let problem = self.problem;
         let declared = Trial::of(problem, declared);
         let first = self.first(declared.clone());
+        if problem.error_model == ErrorModel::InverseDynamics {
+            self.usual = self.simplest(&first).ok().map(|usual| usual.fitted);
+        }
         let best = self.rounds_from(first)?;
         let simplest = self.simplest(&best)?;
         let is_declared = problem.added(&simplest.fitted.model).is_empty();

@@ -1,13 +1,12 @@
-use super::equations::distinguishes;
 use super::evidence::gain;
 use super::identity::EffectId;
+use super::knowledge::Knowledge;
 use super::losses::Losses;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::settings::SelectSettings;
 use crate::data::Joint;
 use crate::data::statistics::{mean, standard_error};
-use crate::identify::submatrix;
 use crate::model::{EffectParameter, FittedEffect};
 
 /// A model with a set of effects, fitted and judged on blocks left out of the fit.
@@ -81,8 +80,7 @@ impl Trial {
         let message = fit.columns_of(|k| problem.is_identifiable(k));
         let is_base = |i: &&usize| fit.columns[**i].parameter < first;
         let base = message.iter().filter(is_base).count();
-        let information = submatrix(&fit.equations().hessian, &message, &message);
-        distinguishes(&information, base, problem.settings.select.own_information)
+        Knowledge::of(problem, model, fit).distinguishes(&message, base)
     }
 
     /// Whether the values of each added effect are consistent with each other and none is at a bound.

@@ -3,6 +3,7 @@
 //! The audit reads the log alone and, of the model, only the names of its columns. It changes nothing: findings are
 //! reported, and the fit decides. Left-out intervals are read like all others.
 
+mod as_one;
 mod channel;
 mod compare;
 mod demand;
@@ -19,6 +20,7 @@ mod rest;
 
 mod table;
 
+pub(crate) use as_one::moves_as_one;
 pub use channel::Channel;
 pub use compare::{MAX_LAG_S, TorqueLag, VelocityCheck};
 pub use demand::TorqueDemand;
@@ -46,8 +48,9 @@ use super::statistics::{deviation, median};
 /// Works on any log that [`Log::of_table`] returns; quantities that need more rows or more motion than
 /// the log has are `None` or 0, as their documentation says.
 pub fn audit(log: &Log, columns: &Columns) -> Audit {
-    let mut audit = of_log(log, columns);
-    rest::report_rest(std::slice::from_mut(&mut audit));
+    let [audit] = audit_together([log], columns)
+        .try_into()
+        .expect("one log has one audit");
     audit
 }
 
@@ -57,9 +60,10 @@ pub fn audit_together<'l>(
     logs: impl IntoIterator<Item = &'l Log>,
     columns: &Columns,
 ) -> Vec<Audit> {
-    let logs = logs.into_iter();
-    let mut audits: Vec<Audit> = logs.map(|log| of_log(log, columns)).collect();
+    let logs: Vec<&Log> = logs.into_iter().collect();
+    let mut audits: Vec<Audit> = logs.iter().map(|log| of_log(log, columns)).collect();
     rest::report_rest(&mut audits);
+    as_one::report_as_one(&logs, &mut audits);
     audits
 }
 

@@ -1,0 +1,49 @@
+use nalgebra::DMatrix;
+
+use super::equations::own_shares;
+use crate::closeloop::problem::Problem;
+use crate::identify::{Fit, submatrix};
+use crate::model::Model;
+
+/// What is known of a fit's values, and how much of it an effect needs for its own.
+pub struct Knowledge {
+    /// Information of the logs alone, then with that of the bodies' declaration.
+    logs: DMatrix<f64>,
+    all: DMatrix<f64>,
+    /// Which values belong to effects that most machines have.
+    usual: Vec<bool>,
+    /// The share of the information on an effect that must be independent of the rest.
+    least: f64,
+}
+
+impl Knowledge {
+    pub fn of(problem: &Problem<'_>, model: &Model, fit: &Fit) -> Self {
+        let usual = |k: &usize| model.effects[*k].effect.baseline.is_some();
+        let places: Vec<_> = (problem.added(model).filter(usual))
+            .map(|k| model.place_of(k))
+            .collect();
+        let is_usual = |parameter| places.iter().any(|place| place.contains(&parameter));
+        let columns = fit.columns.iter();
+        Self {
+            logs: fit.equations().hessian,
+            all: fit.information(),
+            usual: columns.map(|column| is_usual(column.parameter)).collect(),
+            least: problem.settings.select.own_information,
+        }
+    }
+
+    /// Whether these values, after the first `base` of them, are distinguished from each other and from those. What only
+    /// the declared bodies distinguish from errors of theirs, as a rotor next to a link, is distinguished if most
+    /// machines have it: anything else would be an error of the bodies under another name.
+    pub fn distinguishes(&self, columns: &[usize], base: usize) -> bool {
+        let shares = |of: &DMatrix<f64>| own_shares(&submatrix(of, columns, columns), base);
+        let (Some(logs), Some(all)) = (shares(&self.logs), shares(&self.all)) else {
+            return false;
+        };
+        let own = columns[base..].iter().zip(logs.iter().zip(&all));
+        own.into_iter().all(|(i, (logs, all))| {
+            let share = if self.usual[*i] { all } else { logs };
+            *share > self.least
+        })
+    }
+}
