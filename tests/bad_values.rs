@@ -385,6 +385,16 @@ fn archive_of_bytes(megabytes: usize) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
+/// An archive of PyTorch whose description holds as many numbers as bytes.
+fn archive_of_a_pickle(megabytes: usize) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default();
+    archive.start_file("run/data.pkl", options).unwrap();
+    let numbers = vec![b'N'; 1 << 20];
+    (0..megabytes).for_each(|_| archive.write_all(&numbers).unwrap());
+    archive.finish().unwrap().into_inner()
+}
+
 #[test]
 #[cfg(unix)]
 fn packed_files_hold_no_more_than_is_read() {
@@ -397,6 +407,7 @@ fn packed_files_hold_no_more_than_is_read() {
         ("wide.csv.gz", packed(&wide, row, 15)),
         ("large.npz", archive_of_bytes(100)),
         ("short.npz", archive_of_bytes(2)),
+        ("large.pt", archive_of_a_pickle(100)),
     ] {
         scratch.file(name, bytes);
         let message = scratch.refuses_in_little_memory(&format!("audit {name}"));

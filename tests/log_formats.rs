@@ -7,6 +7,7 @@ use residyn_core::data::{Columns, Log, Quantity};
 use residyn_io::read_rig_log;
 
 use crate::support::log_files::formats;
+use crate::support::says;
 
 fn read(path: &Path) -> Result<Log, String> {
     read_rig_log(path, 2, &Columns::default()).map_err(|error| error.to_string())
@@ -55,6 +56,7 @@ mod slow {
             "lz4.parquet",
             "none.parquet",
             "lists.parquet",
+            "double.pt",
         ] {
             let found = read(&folder.join(name)).unwrap();
             let channels = |log: &Log| {
@@ -91,6 +93,68 @@ mod slow {
             let said = read(&folder.join(name)).unwrap_err();
             assert!(said.contains(wanted), "{said}");
         }
+    }
+
+    /// Tensors in the names of PACE and of legged_gym: in single precision, by columns, as views of wider ones.
+    #[test]
+    fn a_dictionary_of_tensors_is_a_log() {
+        let Some(folder) = formats() else { return };
+        let rig = |names: &[&str], driven_by| Columns {
+            joint_names: names.iter().map(|name| (*name).to_owned()).collect(),
+            driven_by,
+            ..Columns::default()
+        };
+        let read = |name: &str, columns: &Columns| {
+            let log = read_rig_log(folder.join(name), 2, columns);
+            log.map_err(|error| error.to_string())
+        };
+        let wanted = self::read(&folder.join("run.csv")).unwrap();
+        let is_near = |found: &[f64], wanted: &[f64]| {
+            let mut pairs = found.iter().zip(wanted);
+            found.len() == wanted.len() && pairs.all(|(a, b)| (a - b).abs() < 1e-7)
+        };
+        let pace = rig(&["elbow", "wrist"], Quantity::Command);
+        let log = read("pace.pt", &pace).unwrap();
+        assert!(is_near(&log.time, &wanted.time));
+        for joint in 0..2 {
+            assert!(is_near(&log.q[joint], &wanted.q[joint]), "q{joint}");
+            assert!(is_near(&log.tau[joint], &wanted.tau[joint]), "cmd{joint}");
+        }
+        says(
+            &log.notes.join("\n"),
+            &["names no joints", "velocities come from the angles"],
+        );
+        // Joints with names may stand in any order.
+        let turned = rig(&["wrist_joint", "elbow_joint"], Quantity::Command);
+        let log = read("named.pt", &turned).unwrap();
+        assert!(is_near(&log.q[0], &wanted.q[1]) && is_near(&log.tau[1], &wanted.tau[0]));
+        assert!(!log.notes.join("\n").contains("names no joints"));
+        let log = read("legged.pt", &rig(&[], Quantity::Torque)).unwrap();
+        assert_eq!((&log.qd, &log.tau), (&wanted.qd, &wanted.tau));
+        assert_eq!(read("ticks.pt", &pace).unwrap().time[7], 7.0);
+        let notes = read("numpy.pt", &pace).unwrap().notes.join("\n");
+        says(
+            &notes,
+            &["\"dt\" is left out: it is not a tensor, but numpy."],
+        );
+        for (name, words) in [
+            (
+                "robots.pt",
+                "robots.pt: tensor \"dof_pos\" has the shape [3, 50, 2]; save one row per sample",
+            ),
+            ("wrong_names.pt", "has 2 columns, and 1 joints have names"),
+            (
+                "object.pt",
+                "entry \"config\" holds a pickled object, pathlib.PurePosixPath, which is never built",
+            ),
+            (
+                "hostile.pt",
+                "entry \"config\" holds a pickled object, posix.system, which is never built",
+            ),
+        ] {
+            says(&read(name, &pace).unwrap_err(), &[words]);
+        }
+        assert!(!folder.join("executed").exists());
     }
 
     /// Positions and commands of an episode, by the names of the joints.
@@ -141,6 +205,7 @@ mod slow {
             "plain.mat",
             "packed.mat",
             "matrices.npz",
+            "named.pt",
             "snappy.parquet",
             "none.parquet",
             "lists.parquet",

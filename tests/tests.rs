@@ -50,6 +50,7 @@ mod recipes;
 mod reference_models;
 mod relative_paths;
 mod repeated_readings;
+mod robot_and_logs;
 mod runs;
 mod shell;
 mod slow;

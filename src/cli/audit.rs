@@ -7,7 +7,9 @@ use clap::Args;
 use super::{Answer, Common, inputs, remedy, terminal};
 use residyn_core::data::{Audit, Columns, Log, Severity, audit_together, report_repeats};
 use residyn_core::model::Library;
-use residyn_io::{read_log, read_log_from, read_model, read_standard_log, read_standard_log_from};
+use residyn_io::{
+    logs_in, read_log, read_log_from, read_model, read_standard_log, read_standard_log_from,
+};
 
 /// Audit logs: units, signs, sampling, noise, jumps, lags, excitation, what they cannot show, and how to fix them
 #[derive(Debug, Args)]
@@ -19,7 +21,7 @@ pub(super) struct Arguments {
     /// assumed
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Logs to audit; `-` for one from standard input
+    /// Logs to audit, or folders of them; `-` for one from standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     #[command(flatten)]
@@ -57,7 +59,8 @@ fn headline(audit: &Audit) -> String {
 
 /// The logs and what their columns are.
 fn read(arguments: &Arguments) -> Result<(Vec<Log>, Columns)> {
-    let logs = arguments.logs.iter();
+    let paths = logs_in(&arguments.logs)?;
+    let logs = paths.iter();
     let Some(model) = &arguments.model else {
         let logs = logs.map(|path| match is_standard_input(path) {
             true => read_standard_log_from(stdin().lock(), "-"),

@@ -1,4 +1,5 @@
 mod calibrate;
+mod robot;
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ use residyn_core::model::InputFile;
 use residyn_core::model::{Library, Model, Origin};
 use residyn_core::rng;
 use residyn_io::runs::RunFolder;
-use residyn_io::{plant_from_text, read_logs, read_model};
+use residyn_io::{logs_in, plant_from_text, read_logs, read_model};
 use residyn_report as report;
 use residyn_train::ResidualTrainer;
 
@@ -29,17 +30,19 @@ use residyn_train::ResidualTrainer;
 /// Without arguments: a simulated demo rig whose logs carry an effect that its model does not declare.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  residyn closeloop --model models/pendulum.toml --train run1.csv run2.csv \\\n      --test run3.csv --leave-out run1.csv@4.2-5.0 --out report\n  residyn closeloop --model pendulum --train run1.csv --test run3.csv --against published.toml old/model.toml\n  residyn closeloop --calibrate 20"
+    after_help = "Example:\n  residyn closeloop --model models/pendulum.toml --train run1.csv run2.csv \\\n      --test run3.csv --leave-out run1.csv@4.2-5.0 --out report\n  residyn closeloop --model pendulum --train run1.csv --test run3.csv --against published.toml old/model.toml\n  residyn closeloop robot.urdf logs/ --kp 20 --kd 1\n  residyn closeloop --calibrate 20"
 )]
 pub(super) struct Arguments {
+    #[command(flatten)]
+    robot: robot::Arguments,
     /// Model file, or the name of a built-in system
     #[arg(long, requires = "train")]
     model: Option<PathBuf>,
-    /// Logs to learn from
-    #[arg(long, num_args = 1.., value_name = "LOG", requires = "model")]
+    /// Logs to learn from: files, or folders of them
+    #[arg(long, num_args = 1.., value_name = "LOG", requires = "model", group = "learned")]
     train: Vec<PathBuf>,
     /// Logs to test on; without them, the last logs or the end of each log are set apart
-    #[arg(long, num_args = 1.., value_name = "LOG", requires = "train")]
+    #[arg(long, num_args = 1.., value_name = "LOG", requires = "learned")]
     test: Vec<PathBuf>,
     /// Other models of the same rig to score as they are, without a fit: files or names of built-in systems
     #[arg(long, num_args = 1.., value_name = "MODEL")]
@@ -101,14 +104,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let begun = Begun::now();
     let library = arguments.effects.library()?;
     let mut rng = rng(arguments.common.seed);
-    let (declared, split) = match &arguments.model {
-        Some(model) => {
-            terminal::stage("reading the logs", || measured(arguments, model, &library))?
-        }
+    let logs = Logs::of(arguments)?;
+    let model = arguments.model.as_deref();
+    let rig = robot::Declared::of(&arguments.robot, model, &arguments.out, &library)?;
+    let (declared, split) = match &rig {
+        Some(rig) => terminal::stage("reading the logs", || measured(arguments, rig, &logs))?,
         None => demo(&library, &mut rng)?,
     };
     let against = references(&arguments.against, &declared, &library)?;
-    let inputs = input_files(arguments)?;
+    let inputs = input_files(arguments, &logs)?;
     if split.test.is_empty() {
         bail!("the logs are too short to set any of them apart for the test; give --test");
     }
@@ -130,11 +134,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     outcome.seconds = stages.finish();
     let origin = || Origin {
         call: Some(begun.call(&inputs)),
-        ..origin(arguments, &declared)
+        ..origin(arguments, &logs, &declared)
     };
     let write = |outcome: &Outcome| {
         interrupt::whole(|| {
             let report = report::write(&arguments.out, outcome, &origin())?;
+            rig.as_ref().map_or(Ok(()), robot::Declared::keep)?;
             written.store(true, Ordering::SeqCst);
             Ok::<_, anyhow::Error>(report)
         })
@@ -177,8 +182,23 @@ fn kept(out: &Path, written: &Arc<AtomicBool>) -> impl Fn() -> String + Send + '
     }
 }
 
-fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(Model, Split)> {
-    let declared = read_model(model, library)?;
+/// The logs of a call, those of folders by their own names.
+struct Logs {
+    train: Vec<PathBuf>,
+    test: Vec<PathBuf>,
+}
+
+impl Logs {
+    fn of(arguments: &Arguments) -> Result<Self> {
+        Ok(Self {
+            train: logs_in(arguments.train.iter().chain(&arguments.robot.logs))?,
+            test: logs_in(&arguments.test)?,
+        })
+    }
+}
+
+fn measured(arguments: &Arguments, rig: &robot::Declared, logs: &Logs) -> Result<(Model, Split)> {
+    let (model, declared) = (&rig.path, rig.model.clone());
     inputs::print_findings(model, &declared, arguments.common.seed);
     if declared.free_parameters() > MANY_PARAMETERS {
         terminal::say(format!(
@@ -188,8 +208,8 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(M
             declared.free_parameters()
         ));
     }
-    let mut train = read_logs(&arguments.train, &declared)?;
-    let mut test = read_logs(&arguments.test, &declared)?;
+    let mut train = read_logs(&logs.train, &declared)?;
+    let mut test = read_logs(&logs.test, &declared)?;
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
     let logs = || train.iter().chain(&test);
     inputs::print_notes(logs());
@@ -254,12 +274,13 @@ fn joints(model: &Model) -> String {
 }
 
 /// The files that the run reads.
-fn input_files(arguments: &Arguments) -> Result<Vec<InputFile>> {
+fn input_files(arguments: &Arguments, logs: &Logs) -> Result<Vec<InputFile>> {
     let effects = arguments.effects.files()?;
     let roles = [
         ("model", arguments.model.as_slice()),
-        ("train", &arguments.train),
-        ("test", &arguments.test),
+        ("robot", arguments.robot.robot.as_slice()),
+        ("train", &logs.train),
+        ("test", &logs.test),
         ("against", &arguments.against),
         ("effect", &effects),
     ];
@@ -267,7 +288,7 @@ fn input_files(arguments: &Arguments) -> Result<Vec<InputFile>> {
     Ok(of_roles.collect::<Result<Vec<_>>>()?.concat())
 }
 
-fn origin(arguments: &Arguments, declared: &Model) -> Origin {
+fn origin(arguments: &Arguments, logs: &Logs, declared: &Model) -> Origin {
     let paths = |paths: &[PathBuf]| -> Vec<String> {
         let paths = paths.iter();
         paths.map(|path| path.display().to_string()).collect()
@@ -280,8 +301,9 @@ fn origin(arguments: &Arguments, declared: &Model) -> Origin {
         config: serde_json::json!({
             "command": "closeloop",
             "model": arguments.model.as_ref().map(|p| p.display().to_string()),
-            "train": paths(&arguments.train),
-            "test": paths(&arguments.test),
+            "robot": arguments.robot.as_json(),
+            "train": paths(&logs.train),
+            "test": paths(&logs.test),
             "against": paths(&arguments.against),
             "leave_out": spans.collect::<Vec<_>>(),
             "effects": paths(&arguments.effects.folders),

@@ -14,7 +14,7 @@ use residyn_core::model::{Dynamics, Model};
 use residyn_core::sim::metric::{
     Summary, TorqueError, assess, summarise, torque_column, torque_error, torques_leave,
 };
-use residyn_io::{read_logs, read_model};
+use residyn_io::{logs_in, read_logs, read_model};
 use residyn_train::Checkpoint;
 
 /// Open-loop prediction error of a model or a checkpoint on logs
@@ -25,7 +25,7 @@ use residyn_train::Checkpoint;
 pub(super) struct Arguments {
     #[command(flatten)]
     model: inputs::ModelArguments,
-    /// Logs to predict
+    /// Logs to predict: files, or folders of them
     #[arg(long, num_args = 1.., required = true, value_name = "LOG")]
     test: Vec<PathBuf>,
     /// Horizons in s
@@ -69,7 +69,9 @@ struct LogEntry {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let (declared, dynamics) = model(arguments)?;
-    let mut logs = terminal::stage("reading the logs", || read_logs(&arguments.test, &declared))?;
+    let mut logs = terminal::stage("reading the logs", || {
+        read_logs(logs_in(&arguments.test)?, &declared)
+    })?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
     if let Source::File(file) = arguments.model.source() {
         inputs::print_findings(file, &declared, arguments.common.seed);

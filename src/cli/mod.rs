@@ -11,6 +11,7 @@ mod evaluate;
 mod experiment;
 mod export;
 mod fitting;
+mod gains;
 mod import;
 mod inputs;
 mod interrupt;

@@ -4,6 +4,7 @@ use anyhow::Result;
 use clap::{Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, value_parser};
 use serde_json::json;
 
+use super::gains::Gains;
 use super::{Answer, Common, terminal};
 use residyn_formats::{FORMATS, Format, RobotReader, model_of};
 use residyn_io::files::write_whole;
@@ -19,12 +20,14 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
     /// What drives the joints, if their logs hold commands instead of torques: one of `residyn list drives`
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", conflicts_with = "kp")]
     drive: Option<String>,
     /// Leave out the damping, dry friction and rotor inertia that the file gives the joints. They are often chosen for a
     /// simulator; without them, `closeloop` names those that the logs show
     #[arg(long)]
     bare_joints: bool,
+    #[command(flatten)]
+    gains: Gains,
     /// The model file to write; standard output if not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -86,7 +89,7 @@ impl FromArgMatches for Description {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let Description { reader, file } = &arguments.description;
     let (tip, drive) = (arguments.tip.as_deref(), arguments.drive.as_deref());
-    let mut tree = reader.tree(file, tip, drive)?;
+    let mut tree = arguments.gains.on(reader.tree(file, tip, drive)?)?;
     if arguments.bare_joints {
         tree = tree.with_bare_joints();
     }

@@ -3,11 +3,17 @@
 Arguments: a CSV file with the columns time, q1, q2, qd1, qd2, tau1, tau2, and the folder to write into.
 """
 
+import collections
 import csv
 import gzip
+import io
 import json
+import os
 import pathlib
+import pickle
 import sys
+import types
+import zipfile
 
 import numpy
 import pyarrow
@@ -82,4 +88,75 @@ first, second = episode(0, table), episode(1, table[:30])
 lerobot("set_v2", "v2.1", {"episode_000000.parquet": [first], "episode_000001.parquet": [second]})
 lerobot("set_v3", "v3.0", {"file-000.parquet": [first, second]})
 lerobot("single", "v3.0", {"file-000.parquet": [first]})
+
+
+class Tensor:
+    """A tensor as PyTorch pickles it: a view of a storage, with sizes and strides in elements."""
+
+    STORAGES = {"float32": "FloatStorage", "float64": "DoubleStorage", "int64": "LongStorage"}
+
+    def __init__(self, values):
+        self.values = values
+        self.storage = values if values.base is None else values.base
+
+    def __reduce_ex__(self, protocol):
+        size = self.values.itemsize
+        stride = tuple(step // size for step in self.values.strides)
+        offset = (self.values.ctypes.data - self.storage.ctypes.data) // size
+        arguments = (self.storage, offset, self.values.shape, stride, False, collections.OrderedDict())
+        return sys.modules["torch._utils"]._rebuild_tensor_v2, arguments
+
+
+def torch_save(path, entries):
+    """What `torch.save` writes (torch/serialization.py, `_save`): a pickle of protocol 2 whose storages are files of their own."""
+    for module, names in {"torch": Tensor.STORAGES.values(), "torch._utils": ["_rebuild_tensor_v2"]}.items():
+        sys.modules[module] = types.ModuleType(module)
+        for name in names:
+            setattr(sys.modules[module], name, type(name, (), {"__module__": module}))
+    storages, pickled = [], io.BytesIO()
+
+    class Pickler(pickle.Pickler):
+        def persistent_id(self, object):
+            if not isinstance(object, numpy.ndarray):
+                return None
+            known = [k for k, storage in enumerate(storages) if storage is object]
+            key = known[0] if known else len(storages)
+            storages[key:] = [object] if not known else storages[key:]
+            kind = getattr(sys.modules["torch"], Tensor.STORAGES[object.dtype.name])
+            return "storage", kind, str(key), "cpu", object.size
+
+    Pickler(pickled, protocol=2).dump({name: Tensor(value) if isinstance(value, numpy.ndarray) else value for name, value in entries.items()})
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr("run/data.pkl", pickled.getvalue())
+        archive.writestr("run/.format_version", "1")
+        archive.writestr("run/byteorder", "little")
+        for key, storage in enumerate(storages):
+            archive.writestr(f"run/data/{key}", storage.tobytes(order="A"))
+        archive.writestr("run/version", "3\n")
+
+
+torch_save(folder / "double.pt", channels)
+names = ["elbow", "wrist"]
+# As PACE keeps them: positions and targets in single precision, here by columns and as a view of a wider tensor.
+wide = numpy.zeros((len(table), 4), dtype=numpy.float32)
+wide[:, 1:3] = table[:, 5:7]
+pace = {"time": table[:, 0].astype(numpy.float32), "dof_pos": numpy.asfortranarray(table[:, 1:3].astype(numpy.float32)), "des_dof_pos": wide[:, 1:3]}
+torch_save(folder / "pace.pt", pace)
+torch_save(folder / "named.pt", {**pace, "joint_names": names, "kp": numpy.full(2, 20.0)})
+torch_save(folder / "ticks.pt", {**pace, "time": numpy.arange(len(table))})
+torch_save(folder / "legged.pt", {"time": table[:, 0].copy(), "dof_pos": table[:, 1:3], "dof_vel": table[:, 3:5], "torques": table[:, 5:7], "des_dof_vel": wide})
+torch_save(folder / "robots.pt", {**pace, "dof_pos": numpy.zeros((3, len(table), 2))})
+torch_save(folder / "wrong_names.pt", {**pace, "joint_names": ["elbow"]})
+torch_save(folder / "numpy.pt", {**pace, "dt": numpy.float64(0.004)})
+torch_save(folder / "object.pt", {**pace, "config": pathlib.PurePosixPath("run")})
+
+
+class Command:
+    """What a hostile file holds: a call."""
+
+    def __reduce__(self):
+        return os.system, (f"touch {folder / 'executed'}",)
+
+
+torch_save(folder / "hostile.pt", {**pace, "config": Command()})
 numpy.savez(folder / "pickled.npz", **{**channels, "q": numpy.array([{"q": 1}] * len(table), dtype=object)})

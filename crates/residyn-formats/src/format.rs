@@ -6,9 +6,9 @@ use thiserror::Error;
 
 use super::ExportModel;
 use super::robot::edit::Edit;
-use super::robot::write_back::Change;
+use super::robot::write_back::{self, Change};
 use super::verify::{Client, ClientError, Predictions, Samples};
-use super::xml::Source;
+use super::xml::{self, Source};
 use residyn_core::data::Joint;
 use residyn_core::limits::DELAY_STEPS;
 use residyn_core::model::tree::{Tree, model_text};
@@ -90,6 +90,20 @@ impl RobotReader {
         let found = found.map_err(|unknown| FileError::new(file, None, unknown.to_string()));
         Ok(tree.driven_by(found?))
     }
+}
+
+/// The reader of a robot description; `None` for a file that is not XML, or not a file.
+///
+/// # Errors
+/// XML that is not a robot description.
+pub fn robot_reader(file: &Path) -> Result<Option<&'static RobotReader>, FileError> {
+    let text = xml::text(file).unwrap_or_default();
+    let begin = text.trim_start_matches('\u{feff}').trim_start();
+    if !begin.starts_with('<') {
+        return Ok(None);
+    }
+    let source = Source::new(file, &text)?;
+    Ok(write_back::format(&source)?.robots.as_ref())
 }
 
 /// The model of a tree.

@@ -21,7 +21,7 @@ mod verify;
 mod xml;
 
 pub use export_model::{ExportModel, ExportedEffect, ExportedTask};
-pub use format::{ExportError, File, Format, RobotReader, model_of};
+pub use format::{ExportError, File, Format, RobotReader, model_of, robot_reader};
 pub use json::{Description, ImportError, Imported};
 pub use robot::write_back::{WrittenBack, write_back};
 pub use verify::{Client, ClientError, Difference, Predictions, PythonClient, Samples, rollout_s};

@@ -4,6 +4,7 @@
 pub mod files;
 mod guarded;
 mod log_file;
+mod log_folder;
 mod model_file;
 mod plant_file;
 pub mod runs;
@@ -14,6 +15,7 @@ pub use log_file::{
     WriteLogError, read_log, read_log_from, read_logs, read_rig_log, read_standard_log,
     read_standard_log_from, write_log,
 };
+pub use log_folder::logs_in;
 pub use model_file::{effect_files, read_effect, read_model, with_effects_in};
 pub use plant_file::{plant_from_text, read_plant};
 pub use table::{LOG_FORMATS, LogFormat};

@@ -42,6 +42,22 @@ pub fn npz(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
+/// A description of tensors, beside their numbers.
+pub fn pt(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let mut add = |name: &str, contents: &[u8], times: usize| {
+        archive
+            .start_file(name, SimpleFileOptions::default())
+            .unwrap();
+        (0..times).for_each(|_| archive.write_all(contents).unwrap());
+    };
+    add("run/data.pkl", &input, times(rng));
+    for storage in ["run/data/0", "run/data/1", "run/data/2", "run/data/3"] {
+        add(storage, &[0; 1600], 1);
+    }
+    archive.finish().unwrap().into_inner()
+}
+
 /// A MATLAB file, each element packed as long as elements can be told apart.
 pub fn mat(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let Some((header, mut rest)) = input.split_at_checked(128) else {

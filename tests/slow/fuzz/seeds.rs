@@ -1,6 +1,7 @@
 //! Valid files of every format: our own, those that the program writes, and those of other libraries.
 
 use std::fs;
+use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use residyn_control::control::Task;
@@ -178,6 +179,25 @@ pub fn npz() -> Vec<Vec<u8>> {
         formats(),
         "matrices.npz columns.npz fortran.npz integers.npz pickled.npz",
     )
+}
+
+pub fn pt() -> Vec<Vec<u8>> {
+    named(
+        formats(),
+        "double.pt pace.pt named.pt ticks.pt legged.pt numpy.pt hostile.pt",
+    )
+}
+
+/// The descriptions of tensors in these files.
+pub fn pickles() -> Vec<Vec<u8>> {
+    let described = |file: Vec<u8>| {
+        let mut archive = zip::ZipArchive::new(Cursor::new(file)).unwrap();
+        let mut pickle = Vec::new();
+        let mut entry = archive.by_name("run/data.pkl").unwrap();
+        entry.read_to_end(&mut pickle).unwrap();
+        pickle
+    };
+    pt().into_iter().map(described).collect()
 }
 
 /// One NumPy array.

@@ -398,6 +398,18 @@ fn npz() {
 }
 
 #[test]
+fn pt() {
+    Target::log("pt", 2000, seeds::pt).run();
+}
+
+#[test]
+fn pickle() {
+    Target::log("pickle", 2000, seeds::pickles)
+        .packed(packed::pt)
+        .run();
+}
+
+#[test]
 fn npy() {
     Target::log("npy", 2000, seeds::npy)
         .of(Form::Text)

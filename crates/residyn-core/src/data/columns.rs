@@ -5,6 +5,7 @@ use std::path::Path;
 use super::column::{Column, Quantity};
 use super::error::{LogError, Place};
 use super::joint::{Joint, of_joints};
+use super::named_columns;
 use super::torque_column::TorqueColumn;
 use crate::expr::listed;
 
@@ -28,7 +29,7 @@ pub struct Columns {
     /// The topic of a recording that has the joints; `None` if their names determine it.
     pub topic: Option<String>,
     /// Names of the joints, if they have any. A standard column that a header lacks may go by the name of its joint:
-    /// `q_elbow` for `q2`.
+    /// `q_elbow`, `elbow_pos` or `position/elbow` for `q2`.
     pub joint_names: Vec<String>,
     /// Whether each joint slides: its columns are then in m, m/s and N. Where it is shorter than the joints, they turn.
     pub slides: Vec<bool>,
@@ -181,7 +182,9 @@ impl Columns {
                 }
                 let by_joint = names.get(joint).map(|name| format!("{stem}_{name}"));
                 let alone = single.then(|| stem.to_owned());
-                if let Some(name) = by_joint.into_iter().chain(alone).find(has) {
+                let plain = by_joint.into_iter().chain(alone).find(has);
+                let by_words = || named_columns::find(header, names.get(joint)?, quantity).cloned();
+                if let Some(name) = plain.or_else(by_words) {
                     column.name = name;
                 }
             }
@@ -190,11 +193,16 @@ impl Columns {
     }
 }
 
-/// The joints after which a header names its angles.
+/// The joints after which a header names its angles. The four parts of a quaternion are none.
 pub(super) fn joints(header: &[String]) -> Vec<&str> {
     let joints = header.iter().filter_map(|name| name.strip_prefix("q_"));
-    joints.collect()
+    let joints: Vec<&str> = joints.collect();
+    let is_quaternion = QUATERNION.iter().all(|part| joints.contains(part));
+    let is_joint = |name: &&str| !is_quaternion || !QUATERNION.contains(name);
+    joints.into_iter().filter(is_joint).collect()
 }
+
+const QUATERNION: [&str; 4] = ["w", "x", "y", "z"];
 
 fn numbered(prefix: &str, joints: usize) -> Vec<Column> {
     let name = |joint: Joint| Column::named(joint.name(prefix));
@@ -271,8 +279,10 @@ impl Header<'_> {
             self.check_joint_count(joints)?;
         }
         let is_torque = columns.driven_by == Quantity::Torque;
-        let passive = is_torque && columns.tau == standard.tau && !self.has_one_like(LIKE_DRIVEN);
-        let still = columns.qd == standard.qd && !self.has_one_like(LIKE_VELOCITY);
+        let passive =
+            is_torque && columns.tau == standard.tau && !self.has_one_like(LIKE_DRIVEN, |_| false);
+        let is_beside = |name: &str| named_columns::is_beside(name, &columns.joint_names);
+        let still = columns.qd == standard.qd && !self.has_one_like(LIKE_VELOCITY, is_beside);
         let columns = columns.renamed_for(&self.names);
         let all = |list: &[Column], quantity| {
             let find = |column: &Column| self.find(column, quantity, &columns);
@@ -330,16 +340,17 @@ impl Header<'_> {
         Ok(())
     }
 
-    /// Whether the name of some column contains one of these words. A torque or a velocity under an unexpected name
-    /// must not be passed over silently.
-    fn has_one_like(&self, words: &[&str]) -> bool {
+    /// Whether the name of some column, but those of something else, contains one of these words. A torque or a velocity
+    /// under an unexpected name must not be passed over silently.
+    fn has_one_like(&self, words: &[&str], is_else: impl Fn(&str) -> bool) -> bool {
         let is_like = |name: &String| {
             let name = name.to_lowercase();
             words.iter().any(|word| name.contains(word))
         };
         // `q_level` is the angle of a joint, whatever its name.
         let is_angle = |name: &String| name.starts_with("q_");
-        let mut others = self.names.iter().filter(|name| !is_angle(name));
+        let others = self.names.iter().filter(|name| !is_angle(name));
+        let mut others = others.filter(|name| !is_else(name));
         others.any(is_like)
     }
 
@@ -617,6 +628,38 @@ mod tests {
             let found = places(header, 1, &Columns::default());
             assert_eq!(found, [1, 2, 3].map(|place| Some(vec![place])));
         }
+    }
+
+    #[test]
+    fn columns_of_named_joints_stand_in_any_order_and_under_many_names() {
+        let columns = Columns {
+            joint_names: ["FL_hip_joint", "FL_calf_joint"]
+                .map(str::to_owned)
+                .to_vec(),
+            ..Columns::default()
+        };
+        let header = "position/FL_calf,FL_hip_pos,time,vel_FL_calf,FL_hip_vel,FL_calf_effort,torque_FL_hip,FL_hip_temp";
+        let found = places(header, 2, &columns);
+        assert_eq!(
+            found,
+            [[1, 0], [4, 3], [6, 5]].map(|two| Some(two.to_vec()))
+        );
+    }
+
+    #[test]
+    fn what_the_base_does_and_should_do_is_ignored_by_name() {
+        let beside =
+            "base_pos_x,q_w,q_x,q_y,q_z,imu_angular_velocity_x,base_lin_vel_z,des_dof_vel1";
+        let found = layout(&format!("time,q1,tau1,{beside}"), 1, &Columns::default()).unwrap();
+        assert_eq!(
+            (found.qd, found.ignored.join(",")),
+            (None, beside.to_owned())
+        );
+        let header: Vec<String> = ["q_w", "q_x", "q_hip", "q_y", "q_z"]
+            .map(str::to_owned)
+            .to_vec();
+        assert_eq!(joints(&header), ["hip"]);
+        assert_eq!(joints(&header[1..]), ["x", "hip", "y", "z"]);
     }
 
     #[test]

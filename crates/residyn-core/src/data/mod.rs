@@ -24,6 +24,7 @@ pub mod leave_out;
 mod local_cubic;
 mod log;
 mod low_pass;
+mod named_columns;
 mod projection;
 mod read;
 mod repeated;

@@ -80,17 +80,16 @@ impl Log {
     }
 
     /// As [`Log::of_table`], for a table with the standard columns and as many joints as its header has, in its order
-    /// if they have names.
+    /// if they have names. Columns `cmd1`, ... without torques are commands.
     ///
     /// # Errors
     /// As [`Log::of_table`].
     pub fn of_standard_table(path: &Path, table: &mut dyn Table) -> Result<Log, LogError> {
-        standard(path, table, Quantity::Torque)
+        standard(path, table)
     }
 
     /// The log with these columns in memory: with `rig`, as [`Log::of_table`] with its columns and number of joints,
-    /// otherwise as [`Log::of_standard_table`], where columns `cmd1`, ... without torques are commands. `name` is for
-    /// messages and the report.
+    /// otherwise as [`Log::of_standard_table`]. `name` is for messages and the report.
     ///
     /// # Errors
     /// As [`Log::of_table`].
@@ -107,32 +106,38 @@ impl Log {
         }
         match rig {
             Some((joints, columns)) => Log::of_table(path, &mut table, joints, columns),
-            None => {
-                let has = |name: &str| table.names().iter().any(|known| known == name);
-                let driven_by = match has("cmd1") && !has("tau1") {
-                    true => Quantity::Command,
-                    false => Quantity::Torque,
-                };
-                standard(path, &mut table, driven_by)
-            }
+            None => standard(path, &mut table),
         }
     }
 }
 
 /// The log of a table with the standard columns.
-fn standard(path: &Path, table: &mut dyn Table, driven_by: Quantity) -> Result<Log, LogError> {
+fn standard(path: &Path, table: &mut dyn Table) -> Result<Log, LogError> {
     let has = |joint: &usize| table.names().contains(&format!("q{joint}"));
     let numbered = (1..).take_while(has).count();
     check_joints(path, numbered.max(joints(table.names()).len()))?;
     let named = joints(table.names()).into_iter();
     let columns = Columns {
         joint_names: named.map(str::to_owned).collect(),
-        driven_by,
+        driven_by: driven_by(table.names()),
         ..Columns::default()
     };
     // A header without joints lacks the first.
     let count = numbered.max(columns.joint_names.len()).max(1);
     Log::of_table(path, table, count, &columns)
+}
+
+/// What the standard columns of a header drive: commands if it has any, and no torque.
+fn driven_by(header: &[String]) -> Quantity {
+    let has = |quantity: Quantity| {
+        let [first, named] = ["1", "_"].map(|end| format!("{}{end}", quantity.key()));
+        let is_one = |name: &String| *name == first || name.starts_with(&named);
+        header.iter().any(is_one)
+    };
+    match has(Quantity::Command) && !has(Quantity::Torque) {
+        true => Quantity::Command,
+        false => Quantity::Torque,
+    }
 }
 
 /// Refuses more joints than are read without a model that chooses among them.

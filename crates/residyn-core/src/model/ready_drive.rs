@@ -136,6 +136,15 @@ pub(super) fn write_plain(model: &mut DocumentMut, joint: Joint) {
     add_line(model, joint, &joint.name(Quantity::Command.key()));
 }
 
+/// Keep a parameter of a joint's drive at its value in fits.
+pub(super) fn hold(model: &mut DocumentMut, parameter: &str, joint: Joint) {
+    let entry = &mut model["parameters"][&own_name(parameter, joint)];
+    if let Some(table) = entry.as_inline_table_mut() {
+        table.insert("fixed", true.into());
+        table.fmt();
+    }
+}
+
 /// `kp_1`
 fn own_name(parameter: &str, joint: Joint) -> String {
     format!("{parameter}_{joint}")

@@ -102,7 +102,11 @@ fn servo(drive: &Element<'_, '_>, kind: &str, gear: f64) -> Result<Option<Servo>
     // The command is the position before the gear, and the gear scales the force once more.
     #[allow(clippy::float_cmp)] // compared as written
     let is_direct = gear == 1.0;
-    Ok(is_direct.then_some(Servo { stiffness, damping }))
+    Ok(is_direct.then_some(Servo {
+        stiffness,
+        damping,
+        is_known: false,
+    }))
 }
 
 fn has_no_dynamics(drive: &Element<'_, '_>) -> bool {

@@ -73,7 +73,7 @@ pub fn write_back(model: &Model, file: &Path, tip: Option<&str>) -> Result<Writt
 }
 
 /// The format of a robot description, by its root element.
-fn format(source: &Source<'_>) -> Result<&'static Format, FileError> {
+pub(crate) fn format(source: &Source<'_>) -> Result<&'static Format, FileError> {
     let root = source.document_root();
     let is_its = |format: &&&Format| {
         let robots = format.robots.as_ref();

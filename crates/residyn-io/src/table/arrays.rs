@@ -27,19 +27,42 @@ impl Unpacked {
     /// Other arrays, and arrays of texts, are left out, as are columns that nothing asks for.
     ///
     /// # Errors
+    /// As [`Unpacked::add_as`].
+    pub fn add(&mut self, name: &str, array: Array<impl Read>) -> Result<(), String> {
+        let is_vector = array.shape.len() == 1;
+        self.add_as(name, array, |column| match is_vector {
+            true => name.to_owned(),
+            false => format!("{name}{}", column + 1),
+        })
+    }
+
+    /// As [`Unpacked::add`], with these names for the columns, counted from 0.
+    ///
+    /// # Errors
     /// An array that holds something else, or is cut off; more columns than any log has, or more numbers than there is
     /// room for.
-    pub fn add(&mut self, name: &str, array: Array<impl Read>) -> Result<(), String> {
-        let dimensions = array.shape.len();
-        for (number, column) in (1..).zip(array.columns(name, &mut self.budget)?) {
-            match dimensions {
-                1 => self.table.add(name, column),
-                _ => self.table.add(format!("{name}{number}"), column),
-            }
+    pub fn add_as(
+        &mut self,
+        name: &str,
+        array: Array<impl Read>,
+        of_column: impl Fn(usize) -> String,
+    ) -> Result<(), String> {
+        let columns = array.columns(name, &mut self.budget)?;
+        for (index, column) in columns.into_iter().enumerate() {
+            self.table.add(of_column(index), column);
         }
         match self.table.names().len() > LOG_COLUMNS {
             true => Err(format!("has more than {LOG_COLUMNS} columns")),
             false => Ok(()),
         }
+    }
+
+    /// Counts bytes that are unpacked on the way to the numbers.
+    ///
+    /// # Errors
+    /// More than there is room for.
+    pub fn take(&mut self, bytes: u64) -> Result<(), String> {
+        let taken = self.budget.take(bytes);
+        taken.map_err(|why| format!("is too large: {why}"))
     }
 }

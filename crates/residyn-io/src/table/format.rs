@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::csv::Csv;
 use super::source::Source;
-use super::{mat, npy, npz, parquet, recording};
+use super::{archive, mat, npy, npz, parquet, pt, recording};
 use residyn_core::data::{Arrays, Columns, LogError, Table};
 
 /// A format of log files.
@@ -13,9 +13,32 @@ pub struct LogFormat {
     pub name: &'static str,
     /// What is read and written in it, as a phrase.
     pub about: &'static str,
-    /// Its first bytes.
-    begin: &'static [u8],
+    /// How the names of its files end, in lower case.
+    pub(crate) endings: &'static [&'static str],
+    mark: Mark,
     reader: Reader,
+}
+
+/// How a format is recognised.
+#[derive(Debug)]
+enum Mark {
+    /// By its first bytes.
+    Begin(&'static [u8]),
+    /// As a zip archive that holds a file of this name.
+    Archive(&'static str),
+}
+
+impl Mark {
+    fn is_on(&self, begin: &[u8], source: &Source) -> bool {
+        match self {
+            Self::Begin(known) => begin.starts_with(known),
+            Self::Archive(name) => {
+                let path = source.plain_file();
+                let path = path.filter(|_| begin.starts_with(archive::BEGIN));
+                path.is_some_and(|path| archive::size_of(path, name).is_some())
+            }
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -35,9 +58,20 @@ type OfBytes = fn(&Path, Source) -> Result<Box<dyn Table>, LogError>;
 /// Every format. A new one is one more entry here, before that of texts, which may begin with anything.
 pub const LOG_FORMATS: &[LogFormat] = &[
     LogFormat {
+        name: "pt",
+        about: "logs of PyTorch, a dictionary of tensors, as PACE and legged_gym keep them, in",
+        endings: &["pt", "pth"],
+        mark: Mark::Archive(pt::DESCRIPTION),
+        reader: Reader::File {
+            read: |path, _| pt::read(path),
+            packed: "a gzipped .pt is not read; unpack it: `gunzip run.pt.gz`",
+        },
+    },
+    LogFormat {
         name: "npz",
         about: "logs of NumPy, in",
-        begin: b"PK\x03\x04",
+        endings: &["npz"],
+        mark: Mark::Begin(archive::BEGIN),
         reader: Reader::File {
             read: |path, _| npz::read(path),
             packed: "a gzipped .npz is not read; unpack it: `gunzip run.npz.gz`",
@@ -46,19 +80,22 @@ pub const LOG_FORMATS: &[LogFormat] = &[
     LogFormat {
         name: "npy",
         about: "logs of NumPy, one matrix whose columns go by their numbers, in",
-        begin: npy::MAGIC,
+        endings: &["npy"],
+        mark: Mark::Begin(npy::MAGIC),
         reader: Reader::Bytes(|name, source| Ok(Box::new(npy::read(name, &source)?))),
     },
     LogFormat {
         name: "mat",
         about: "logs of MATLAB, versions 5 to 7, in",
-        begin: mat::MAGIC,
+        endings: &["mat"],
+        mark: Mark::Begin(mat::MAGIC),
         reader: Reader::Bytes(|name, source| Ok(Box::new(mat::read(name, &source)?))),
     },
     LogFormat {
         name: "mcap",
         about: "recordings of robots, joint states in CDR or JSON, in",
-        begin: b"\x89MCAP0\r\n",
+        endings: &["mcap"],
+        mark: Mark::Begin(b"\x89MCAP0\r\n"),
         reader: Reader::File {
             read: recording::of_mcap,
             packed: "a packed recording is not read; unpack it: `gunzip run.mcap.gz`",
@@ -67,7 +104,8 @@ pub const LOG_FORMATS: &[LogFormat] = &[
     LogFormat {
         name: "rosbag2",
         about: "recordings of ROS 2 as .db3 files and folders, in",
-        begin: b"SQLite format 3\0",
+        endings: &["db3"],
+        mark: Mark::Begin(b"SQLite format 3\0"),
         reader: Reader::File {
             read: recording::of_bag,
             packed: "a packed recording is not read; unpack it: `gunzip run.db3.gz`",
@@ -76,7 +114,8 @@ pub const LOG_FORMATS: &[LogFormat] = &[
     LogFormat {
         name: "parquet",
         about: "logs, and data sets of LeRobot, in",
-        begin: b"PAR1",
+        endings: &["parquet"],
+        mark: Mark::Begin(b"PAR1"),
         reader: Reader::File {
             read: |path, _| parquet::read(path),
             packed: "a gzipped Parquet file is not read; unpack it: `gunzip run.parquet.gz`",
@@ -85,7 +124,8 @@ pub const LOG_FORMATS: &[LogFormat] = &[
     LogFormat {
         name: "csv",
         about: "logs, out; in with any separator, decimal commas, and packed with gzip",
-        begin: b"",
+        endings: &["csv", "tsv", "csv.gz", "tsv.gz"],
+        mark: Mark::Begin(b""),
         reader: Reader::Bytes(|name, source| Ok(Box::new(Csv::of(name, source)?))),
     },
 ];
@@ -126,7 +166,7 @@ pub(super) fn read(
         return Err(LogError::form(name, *remedy));
     }
     let mut formats = LOG_FORMATS.iter();
-    let format = formats.find(|format| begin.starts_with(format.begin));
+    let format = formats.find(|format| format.mark.is_on(&begin, &source));
     match format.expect("a text begins with anything").reader {
         Reader::Bytes(read) => read(name, source),
         Reader::File { read, packed } => match source.plain_file() {

@@ -8,6 +8,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::parquet::{List, lists};
+use super::{DATA_SET, is_data_set};
 use crate::files::{self, listed, read_saved};
 use residyn_core::data::Arrays;
 use residyn_core::data::LogError;
@@ -39,7 +40,7 @@ impl Episode {
     /// `SET`, `SET#3`, or the file of an episode in a data set of version 2; `None` for any other path.
     pub fn of(path: &Path) -> Option<Self> {
         let episode = |set: &Path, number: Option<u64>| {
-            set.join(INFO).is_file().then(|| Self {
+            is_data_set(set).then(|| Self {
                 path: path.to_owned(),
                 set: set.to_owned(),
                 number,
@@ -139,10 +140,10 @@ impl Episode {
     }
 
     fn info(&self) -> Result<Info, LogError> {
-        let text = read_saved(&self.set.join(INFO)).map_err(LogError::open(&self.path))?;
+        let text = read_saved(&self.set.join(DATA_SET)).map_err(LogError::open(&self.path))?;
         serde_json::from_slice(&text).map_err(|why| {
             self.fault(format!(
-                "{INFO} is damaged: {why}; write the data set again"
+                "{DATA_SET} is damaged: {why}; write the data set again"
             ))
         })
     }
@@ -151,9 +152,6 @@ impl Episode {
         LogError::form(&self.path, fault)
     }
 }
-
-/// The file that identifies a data set and describes it.
-const INFO: &str = "meta/info.json";
 
 #[derive(Debug, Deserialize)]
 struct Info {

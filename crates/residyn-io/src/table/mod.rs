@@ -1,5 +1,6 @@
 //! Log files as named columns of numbers: one reader per format, behind one function.
 
+mod archive;
 mod arrays;
 mod budget;
 mod csv;
@@ -15,6 +16,7 @@ mod npy;
 mod npz;
 #[cfg_attr(not(feature = "parquet"), path = "no_parquet.rs")]
 mod parquet;
+mod pt;
 #[cfg_attr(not(feature = "recordings"), path = "no_recording.rs")]
 mod recording;
 mod source;
@@ -29,6 +31,14 @@ use crate::guarded::guarded;
 use residyn_core::limits::LOG_COLUMNS;
 
 pub use format::{LOG_FORMATS, LogFormat};
+
+/// Whether a folder is a data set of LeRobot.
+pub(super) fn is_data_set(folder: &Path) -> bool {
+    folder.join(DATA_SET).is_file()
+}
+
+/// The file that identifies a data set of LeRobot and describes it.
+const DATA_SET: &str = "meta/info.json";
 
 /// The table that a file or a folder holds, whatever its format: by how it begins, not by its name. If a file holds
 /// several tables, the one that has the columns.

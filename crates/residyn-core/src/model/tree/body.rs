@@ -38,6 +38,8 @@ pub struct Servo {
     pub stiffness: f64,
     /// N m s/rad, or N s/m.
     pub damping: f64,
+    /// Whether its user knows the two, so that fits hold them.
+    pub is_known: bool,
 }
 
 /// How a joint follows another: its coordinate is `ratio * q + offset`, with the leader's q.
@@ -149,6 +151,23 @@ impl Tree {
             ));
         }
         self.drive = Some(drive);
+        self
+    }
+
+    /// The tree with a position loop of known gains at every joint that follows no other, in the order of these joints: as
+    /// many of both as there are such joints, or one for all (N m/rad and N m s/rad, or N/m and N s/m).
+    #[must_use]
+    pub fn with_gains(mut self, stiffness: &[f64], damping: &[f64]) -> Self {
+        let leaders = self.joints.iter_mut();
+        let leaders = leaders.filter(|joint| joint.follows.is_none());
+        let gains = stiffness.iter().cycle().zip(damping.iter().cycle());
+        for (joint, (stiffness, damping)) in leaders.zip(gains) {
+            joint.drivetrain.servo = Some(Servo {
+                stiffness: *stiffness,
+                damping: *damping,
+                is_known: true,
+            });
+        }
         self
     }
 

@@ -12,12 +12,14 @@ use super::equations::Kind;
 use super::formula::number;
 use super::series::{LONGEST_CLOSED_FORM, rounded};
 use crate::data;
-use crate::model::ready_drive::write_plain;
+use crate::model::ready_drive::{hold, write_plain};
 use crate::model::{Library, ReadyDrive};
 
 /// The drives of a position loop: with an effort limit, and without.
 const SERVO: &str = "position_servo";
 const UNLIMITED_SERVO: &str = "position_loop";
+/// The parameters of both that are stiffness and damping.
+const GAINS: [&str; 2] = ["kp", "kd"];
 /// The drive parameter that is the effort limit.
 pub(super) const LIMIT: &str = "limit";
 
@@ -54,11 +56,14 @@ fn with_drives(text: String, tree: &Tree) -> String {
         let Drivetrain { servo, effort, .. } = joint.drivetrain;
         let gains = servo
             .into_iter()
-            .flat_map(|servo| [("kp", servo.stiffness), ("kd", servo.damping)]);
+            .flat_map(|servo| GAINS.into_iter().zip([servo.stiffness, servo.damping]));
         let known: Vec<(&str, f64)> = gains.chain(effort.map(|limit| (LIMIT, limit))).collect();
         match drive_of(tree, joint) {
             Some(drive) => drive.write_into(&mut model, number, joint.slides, &known),
             None => write_plain(&mut model, number),
+        }
+        if servo.is_some_and(|servo| servo.is_known) {
+            GAINS.iter().for_each(|gain| hold(&mut model, gain, number));
         }
     }
     model.to_string()

@@ -1,0 +1,200 @@
+//! PyTorch's `.pt`: a dictionary of tensors as `torch.save` writes it, in the names that PACE, legged_gym and Isaac Lab
+//! give them. It is a pickle, and loading one runs what it names: `pytorch-reader` runs nothing and builds only
+//! dictionaries, lists, numbers, texts and tensors.
+
+use std::collections::HashMap;
+use std::io::Cursor;
+use std::path::Path;
+
+use pytorch_reader::{DType, PickleValue, PytorchError, PytorchReader, Tensor};
+
+use super::archive;
+use super::arrays::Unpacked;
+use super::npy::Array;
+use crate::files;
+use residyn_core::data::{Arrays, LogError};
+
+/// The file in the archive that describes the tensors.
+pub(super) const DESCRIPTION: &str = "data.pkl";
+
+/// Memory that a byte of the description may become: one that stands for an object \[bytes\].
+const OBJECT: u64 = 128;
+
+/// Names of the tensors with a column for each joint, and the stems of the standard names; of several for one stem, the
+/// first is read.
+const CHANNELS: [(&str, &str); 11] = [
+    ("dof_pos", "q"),
+    ("joint_pos", "q"),
+    ("dof_vel", "qd"),
+    ("joint_vel", "qd"),
+    ("des_dof_pos", "cmd"),
+    ("dof_pos_target", "cmd"),
+    ("joint_pos_target", "cmd"),
+    ("targets", "cmd"),
+    ("torques", "tau"),
+    ("dof_torque", "tau"),
+    ("actual_torque", "tau"),
+];
+
+/// Names of the list that names the joints, in the order of their columns.
+const JOINTS: [&str; 3] = ["joint_names", "dof_names", "joint_order"];
+
+/// # Errors
+/// A file that cannot be read, one that holds other objects than tensors, and tensors that are not of numbers.
+pub(super) fn read(path: &Path) -> Result<Arrays, LogError> {
+    let packed = files::size(path).map_err(LogError::open(path))?;
+    table(path, packed).map_err(|fault| LogError::form(path, fault))
+}
+
+fn table(path: &Path, packed: u64) -> Result<Arrays, String> {
+    let mut unpacked = Unpacked::of(packed);
+    let description = archive::size_of(path, DESCRIPTION).unwrap_or(0);
+    unpacked.take(description.saturating_mul(OBJECT))?;
+    let entries = PytorchReader::read_pickle_data(path, None).map_err(broken)?;
+    let PickleValue::Dict(entries) = entries else {
+        return Err("holds no dictionary; save one of tensors, `torch.save({\"time\": time, \"dof_pos\": q, ..}, path)`".to_owned());
+    };
+    unpacked.table.notes.extend(left_out(&entries)?);
+    let joints = joints(&entries);
+    let mut tensors: Vec<Tensor> = PytorchReader::new(path)
+        .map_err(broken)?
+        .into_tensors()
+        .into_values()
+        .collect();
+    tensors.sort_by(|a, b| a.name.cmp(&b.name));
+    let names: Vec<String> = tensors.iter().map(|tensor| tensor.name.clone()).collect();
+    for tensor in tensors {
+        add(&mut unpacked, &tensor, stem(&tensor.name, &names), &joints)?;
+    }
+    if joints.is_empty() {
+        let note = "names no joints: the columns of its tensors are taken in the order of the model's joints";
+        unpacked.table.notes.push(note.to_owned());
+    }
+    Ok(unpacked.table)
+}
+
+/// The stem of a tensor's columns, if it is the file's for that stem.
+fn stem(name: &str, all: &[String]) -> Option<&'static str> {
+    let (_, stem) = CHANNELS.iter().find(|(known, _)| *known == name)?;
+    let mut of_stem = CHANNELS.iter().filter(|(_, other)| other == stem);
+    let first = of_stem.find(|(known, _)| all.iter().any(|name| name == known))?;
+    (first.0 == name).then_some(stem)
+}
+
+/// The columns of a tensor: of a joint each if it has a stem, as those of an array otherwise.
+fn add(
+    unpacked: &mut Unpacked,
+    tensor: &Tensor,
+    stem: Option<&str>,
+    joints: &[String],
+) -> Result<(), String> {
+    let (name, shape) = (&tensor.name, tensor.shape());
+    let is_channel = stem.is_some() || name == "time";
+    if !(1..=2).contains(&shape.len()) {
+        return match is_channel {
+            true => Err(format!(
+                "tensor {name:?} has the shape {shape:?}; save one row per sample, and one column per joint"
+            )),
+            false => Ok(()),
+        };
+    }
+    let columns = shape.get(1).copied().unwrap_or(1);
+    if stem.is_some() && !joints.is_empty() && joints.len() != columns {
+        return Err(format!(
+            "tensor {name:?} has {columns} columns, and {} joints have names; save as many of both",
+            joints.len()
+        ));
+    }
+    unpacked.take(tensor.byte_len() as u64)?;
+    let numbers = tensor.read().map_err(|why| damaged(&why))?;
+    let array = Array {
+        kind: kind(tensor.dtype()).to_owned(),
+        by_columns: false,
+        shape: shape.to_vec(),
+        numbers: Cursor::new(numbers),
+    };
+    match (stem, joints) {
+        (Some(stem), [_, ..]) => {
+            unpacked.add_as(name, array, |column| format!("{stem}_{}", joints[column]))
+        }
+        _ => unpacked.add(stem.unwrap_or(name), array),
+    }
+}
+
+/// The names of the joints; none if the file gives none.
+fn joints(entries: &HashMap<String, PickleValue>) -> Vec<String> {
+    let names = JOINTS.iter().find_map(|name| match entries.get(*name) {
+        Some(PickleValue::List(names)) => Some(names.as_slice()),
+        _ => None,
+    });
+    let text = |name: &PickleValue| match name {
+        PickleValue::String(name) => Some(name.clone()),
+        _ => None,
+    };
+    let names: Option<Vec<String>> = names.unwrap_or_default().iter().map(text).collect();
+    names.unwrap_or_default()
+}
+
+/// Notes on numbers of NumPy, which are not read.
+///
+/// # Errors
+/// A channel that is one of these, and any other object: only its name is known, since to build it is to run code.
+fn left_out(entries: &HashMap<String, PickleValue>) -> Result<Vec<String>, String> {
+    let mut found: Vec<(&String, &str)> = entries
+        .iter()
+        .filter_map(|(name, value)| Some((name, foreign(value)?)))
+        .collect();
+    found.sort_unstable();
+    let note = |(name, kind): (&String, &str)| {
+        let is_channel = name == "time" || CHANNELS.iter().any(|(known, _)| known == name);
+        match kind.starts_with("numpy.") && !is_channel {
+            true => Ok(format!(
+                "{name:?} is left out: it is not a tensor, but {kind}"
+            )),
+            false => Err(format!(
+                "entry {name:?} holds a pickled object, {kind}, which is never built, since that can run any code; save \
+                 tensors, such as torch.as_tensor(values)"
+            )),
+        }
+    };
+    found.into_iter().map(note).collect()
+}
+
+/// The Python type of an object in a value that is neither plain data nor PyTorch's own.
+fn foreign(value: &PickleValue) -> Option<&str> {
+    match value {
+        PickleValue::Unsupported(kind) => {
+            Some(kind.as_str()).filter(|kind| !kind.starts_with("torch.") && *kind != "int")
+        }
+        PickleValue::List(values) => values.iter().find_map(foreign),
+        PickleValue::Dict(values) => values.values().find_map(foreign),
+        _ => None,
+    }
+}
+
+/// The name that NumPy gives to numbers of this kind.
+fn kind(numbers: DType) -> &'static str {
+    match numbers {
+        DType::F64 => "<f8",
+        DType::F32 => "<f4",
+        DType::F16 => "<f2",
+        DType::BF16 => "bfloat16",
+        DType::I64 => "<i8",
+        DType::I32 => "<i4",
+        DType::I16 => "<i2",
+        DType::I8 => "|i1",
+        DType::U64 => "<u8",
+        DType::U32 => "<u4",
+        DType::U16 => "<u2",
+        DType::U8 => "|u1",
+        DType::Bool => "|b1",
+    }
+}
+
+fn broken(why: PytorchError) -> String {
+    damaged(&why)
+}
+
+fn damaged(why: &dyn std::fmt::Display) -> String {
+    format!("is not a dictionary of tensors as torch.save writes it: {why}; write it again")
+}
