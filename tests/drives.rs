@@ -465,4 +465,50 @@ mod slow {
         let estimate = found(&report, "coulomb_friction", 1).unwrap();
         assert!(holds(estimate, 0.12), "{estimate:?}");
     }
+
+    /// What the joints of a servo rig have beyond its drawing: effect, joint, values.
+    const BEYOND: &str = "
+viscous_friction | 2 | b = 0.3
+coulomb_friction | 2 | F_c = 0.5
+coulomb_friction | 3 | F_c = 0.3
+rotor_inertia    | 3 | J = 0.01
+actuator_delay   | 2 | d = 0.0137
+actuator_gain    | 2 | g = -0.2
+actuator_gain    | 3 | g = 0.25
+constant_torque  | 3 | tau_0 = 0.4
+";
+
+    /// What the model says of a rig and what MuJoCo makes of its file are the same motion.
+    fn moves_alike(scratch: &Scratch, declared: &str, joints: usize) {
+        let effect = |[name, joint, values]: [String; 3]| {
+            format!("\n[[effect]]\nname = \"{name}\"\njoint = {joint}\n{values}\n")
+        };
+        let effects: String = rows(BEYOND).into_iter().map(effect).collect();
+        scratch.file("rig.toml", declared.to_owned() + &effects);
+        let [amplitude, start] = [vec![0.5; joints], vec![0.0; 2 * joints]];
+        let plant = format!(
+            "model = \"rig.toml\"\nsensor = {{ rate_hz = 200, position_noise = 0, position_step = 0 }}\n\
+             excitation = {{ amplitude = {amplitude:?}, band_hz = [0.1, 3.0], tones = 8 }}\n\
+             recording = {{ logs = 1, duration_s = 15, start = {start:?} }}\n"
+        );
+        scratch.file("plant.toml", plant);
+        scratch.succeeds("simulate --plant plant.toml --out run.csv");
+        scratch.succeeds("export --model rig.toml --format mjcf --step 0.001 --out rig.xml");
+        let files = ["rig.xml", "run.csv"].map(|name| scratch.path(name));
+        client("servo_motion.py", &[&files[0], &files[1]]);
+    }
+
+    #[test]
+    fn mujoco_moves_an_exported_servo_arm_as_the_model_does() {
+        let declared = include_str!("fixtures/servo_arm.toml");
+        moves_alike(&Scratch::new(), declared, 3);
+    }
+
+    #[test]
+    fn mujoco_moves_two_exported_legs_as_the_model_does() {
+        let scratch = Scratch::new();
+        scratch.file("drawn.xml", legs([""; 2], [""; 2]));
+        scratch.succeeds("new --from-mjcf drawn.xml --out legs.toml");
+        moves_alike(&scratch, &scratch.read("legs.toml"), 4);
+    }
 }

@@ -9,6 +9,7 @@
 // A method that never ends is noticed.
 #![allow(clippy::disallowed_methods)]
 
+mod actuator_blocks;
 mod arms;
 mod bad_input;
 mod bad_values;

@@ -32,12 +32,18 @@ def begin(state):
     data.qpos, data.qvel = state[:n], state[n:]
 
 
+# Delays of the commands, which MuJoCo 3.5 and later know.
+delay = getattr(model, "actuator_delay", np.zeros(0))
+delays = delay.copy()
+
+
 def derivative(state, torque):
-    """The torque acts: for a drive with a lag it is the lagged torque."""
+    """The torque acts: for a drive with a delay or a lag it is the delayed or lagged torque."""
     begin(state)
-    data.ctrl = torque
+    data.ctrl, delay[:] = torque, 0
     data.act = [t for t, address in zip(torque, model.actuator_actadr) if address >= 0]
     mujoco.mj_forward(model, data)
+    delay[:] = delays
     return [*data.qvel, *data.qacc]
 
 

@@ -13,7 +13,8 @@ use residyn_core::model::Library;
 use residyn_core::rng;
 use residyn_core::sim::Integrator;
 use residyn_formats::{
-    ClientError, Difference, ExportModel, File, Format, WrittenBack, find, rollout_s, write_back,
+    Client, ClientError, Difference, ExportModel, File, Format, WrittenBack, find, rollout_s,
+    write_back,
 };
 use residyn_io::files::{OutputError, folder_of, write_whole};
 use residyn_io::read_model;
@@ -69,7 +70,7 @@ fn write(arguments: &Arguments, format: &'static Format) -> Result<Answer> {
     let task = exported_task(model.name());
     let model = model.with_task(task);
     let not_carried = (format.not_carried)(&model);
-    if let Some(message) = steps_message(&model, arguments)? {
+    if let Some(message) = steps_message(format, &model, arguments)? {
         terminal::say(message);
     }
     prepare(arguments, &not_carried)?;
@@ -90,8 +91,15 @@ fn write(arguments: &Arguments, format: &'static Format) -> Result<Answer> {
     })
 }
 
-/// What to do if the steps are too long for the friction of a model at rest.
-fn steps_message(model: &ExportModel, arguments: &Arguments) -> Result<Option<String>> {
+/// What to do if the steps are too long for the friction of a model at rest. Files that nobody can step have none.
+fn steps_message(
+    format: &Format,
+    model: &ExportModel,
+    arguments: &Arguments,
+) -> Result<Option<String>> {
+    if matches!(format.client, Client::None(_)) {
+        return Ok(None);
+    }
     let mut rng = rng(arguments.common.seed);
     let needed = model.substeps_around_rest(&mut rng)?;
     if needed <= model.integrator.substeps() {

@@ -12,7 +12,7 @@ use serde_json::json;
 use crate::support::catalogue::{assert_near, points, rng};
 use crate::support::mechanisms::{fixture, read, read_to};
 use crate::support::predictions::{client_agrees, predictions};
-use crate::support::tables::rows;
+use crate::support::tables::{rows, says_words};
 use crate::support::{exported_models, refuses, residyn, text};
 
 /// An effect as in a model file.
@@ -60,6 +60,9 @@ const DRIVEN: &str = "
 servo with a gain | servo    | rk4 | actuator_gain@1: g = 0.3; SPRING@1
 gain, then limit  | pendulum | rk4 | actuator_gain@1: g = 0.3; actuator_saturation@1: m = 3.0; SPRING@1
 limit, then gain  | acrobot  | rk4 | actuator_saturation@2: m = 3.0; actuator_gain@2: g = 0.3; ROTOR@1; ROTOR@2
+shifted servo     | servo    | rk4 | actuator_gain@1: g = 0.3; constant_torque@1: tau_0 = 0.2; sensor_offset@1: q_z = 0.1
+late servo        | servo    | euler | actuator_delay@1: d = 0.025; actuator_gain@1: g = -0.2
+late motor        | acrobot  | euler | actuator_delay@2: d = 0.02; actuator_saturation@2: m = 3.0
 gain and offset   | cartpole | rk4 | constant_torque@1: tau_0 = -0.4; actuator_gain@1: g = 0.3; ROTOR@1; ROTOR@2; SPRING@2
 ";
 
@@ -171,6 +174,27 @@ fn a_lag_has_the_same_derivative() {
     }
     let limits = (format.not_carried)(&model);
     assert!(limits[0].starts_with("the lag within a step"), "{limits:?}");
+}
+
+/// An effect on the servo, the integrator, and what its file says that MuJoCo does otherwise.
+const TIMING: &str = "
+actuator_delay@1: d = 0.025 | rk4   | commands that jump within a step
+actuator_delay@1: d = 0.005 | euler | delays shorter than a step of 0.01 s ... give a shorter --step
+actuator_lag@1: T = 0.05    | euler | the lag within a step
+";
+
+#[test]
+fn delays_that_mujoco_has_otherwise_are_listed() {
+    let said = |cell: &str, integrator: &str| {
+        let [(_, model)] = &models(&format!("x | servo | {integrator} | {cell}"))[..] else {
+            panic!("one model");
+        };
+        (find("mjcf").unwrap().not_carried)(model).join("\n")
+    };
+    for [cell, integrator, words] in rows(TIMING) {
+        says_words(&said(&cell, &integrator), &words);
+    }
+    assert_eq!(said("actuator_delay@1: d = 0.025", "euler"), "");
 }
 
 #[test]

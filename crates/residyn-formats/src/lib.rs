@@ -3,6 +3,7 @@
 //!
 //! A new format is a file with a [`Format`] and one line in [`FORMATS`]: commands, lists and tests read that table.
 
+mod blocks;
 mod c;
 mod discrete_filter;
 mod export_model;
@@ -35,9 +36,11 @@ pub const FORMATS: &[&Format] = &[
     &c::FORMAT,
     &fmu::fmi3::FORMAT,
     &fmu::fmi2::FORMAT,
+    &blocks::isaaclab::FORMAT,
     &json::JSON,
     &latex::FORMAT,
     &mjcf::FORMAT,
+    &blocks::mjlab::FORMAT,
     &onnx::FORMAT,
     &python::FORMAT,
     &json::SAFETENSORS,

@@ -49,6 +49,11 @@ pub(super) fn drives<'s, 'x>(
         if gear != 1.0 && servo.is_none() {
             drive.note(format!("`{name}` has the gear {gear}: tau is the torque or force at `{joint}`, {gear} times the control"));
         }
+        if let Some(delay) = drive.text("delay").filter(|delay| *delay != "0") {
+            drive.note(format!(
+                "the delay of `{name}`, {delay} s, is not carried; `actuator_delay` is the effect"
+            ));
+        }
         let ranges: &[_] = match servo {
             None => &[CONTROL, FORCE],
             Some(_) => &[FORCE],

@@ -2,6 +2,7 @@
 
 mod actuator;
 mod classes;
+mod drive;
 mod equality;
 mod geom;
 mod orientation;

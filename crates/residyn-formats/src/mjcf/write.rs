@@ -3,10 +3,11 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use super::drive::{actuators, timing_not_carried};
 use super::read::read_mjcf;
 use super::rewrite::{inertial, rewrite};
 use crate::robot::mechanism::{
-    Drive, Link, Mechanism, file, friction_widths, head, numbers, option,
+    Link, Mechanism, file, friction_widths, head, mujoco_step_s, numbers, option,
 };
 use crate::verify::{Client, PythonClient};
 use crate::xml::escaped;
@@ -38,14 +39,8 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
     let Ok(mechanism) = Mechanism::of(model) else {
         return Vec::new();
     };
-    let mut lost = mechanism.not_carried;
-    if mechanism.drives.iter().any(|drive| drive.lag.is_some()) {
-        lost.push(
-            "the lag within a step: MuJoCo holds the lagged torque over each step; only the derivative is compared"
-                .into(),
-        );
-    }
-    lost
+    let timing = timing_not_carried(model, &mechanism);
+    [mechanism.not_carried, timing].concat()
 }
 
 fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
@@ -56,22 +51,19 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
     let mut text = head(model);
     let _ = write!(
         text,
-        "<mujoco model=\"{}\">\n  <compiler angle=\"radian\"/>\n  {}\n  <custom>\n    \
+        "<mujoco model=\"{}\">\n  <compiler angle=\"radian\"/>\n  {}\n{}  <custom>\n    \
          <!-- Velocities over which dry friction reverses in the exported model. -->\n    \
          <numeric name=\"dry_friction_width\" data=\"{}\"/>\n  </custom>\n  <worldbody>\n",
         escaped(model.name()),
         option(model, mechanism),
+        friction_default(model, mechanism),
         friction_widths(model)
     );
     let links = mechanism.links();
     for k in mechanism.carried_by(None) {
         text += &body(mechanism, &links, k, 2);
     }
-    text += "  </worldbody>\n  <actuator>\n";
-    for (joint, drive) in mechanism.joints.iter().zip(&mechanism.drives) {
-        text += &actuator(joint, drive);
-    }
-    text + "  </actuator>\n</mujoco>\n"
+    text + "  </worldbody>\n" + &actuators(model, mechanism) + "</mujoco>\n"
 }
 
 /// A body with those that it carries, `depth` elements deep.
@@ -126,36 +118,22 @@ fn of_joint(joint: &Joint) -> String {
     ])
 }
 
+/// Dry friction as stiff as the step allows, which is twice its length: with MuJoCo's default of 20 ms, joints creep where
+/// they should stick.
+fn friction_default(model: &ExportModel, mechanism: &Mechanism) -> String {
+    let mut joints = mechanism.joints.iter();
+    if !joints.any(|joint| joint.drivetrain.friction > 0.0) {
+        return String::new();
+    }
+    let stiffest = numbers([2.0 * mujoco_step_s(model), 1.0]);
+    format!("  <default>\n    <joint solreffriction=\"{stiffest}\"/>\n  </default>\n")
+}
+
 /// Attributes whose values differ from the format's defaults.
-fn attributes(values: &[(&str, f64, f64)]) -> String {
+pub(super) fn attributes(values: &[(&str, f64, f64)]) -> String {
     #[allow(clippy::float_cmp)] // compared as set
     let given = values.iter().filter(|(_, value, default)| value != default);
     given
         .map(|(key, value, _)| format!(" {key}=\"{value}\""))
         .collect()
-}
-
-fn actuator(joint: &Joint, drive: &Drive) -> String {
-    let mut text = format!("    <general name=\"{}\" joint=\"{0}\"", joint.name);
-    text += &attributes(&[("gear", drive.gear, 1.0), ("gainprm", drive.gain, 1.0)]);
-    let [constant, by_position, by_velocity] = drive.bias;
-    if drive.bias != [0.0; 3] {
-        let _ = write!(
-            text,
-            " biastype=\"affine\" biasprm=\"{}\"",
-            // The bias depends on the actuator's length and velocity: the joint's times the gear.
-            numbers([constant, by_position / drive.gear, by_velocity / drive.gear])
-        );
-    }
-    if let Some(limit) = drive.limit {
-        let _ = write!(
-            text,
-            " forcelimited=\"true\" forcerange=\"{}\"",
-            numbers([-limit, limit])
-        );
-    }
-    if let Some(time) = drive.lag {
-        let _ = write!(text, " dyntype=\"filterexact\" dynprm=\"{time}\"");
-    }
-    text + "/>\n"
 }

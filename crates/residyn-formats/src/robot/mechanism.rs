@@ -6,11 +6,10 @@ use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::servo::{Servo, servos};
-use super::value;
+use super::powertrain::{Drive, Powertrains};
 use crate::xml::escaped;
-use crate::{ExportError, ExportModel, ExportedEffect, File};
-use residyn_core::model::tree::{Joint, Pose, Spring, recover, rounded};
+use crate::{ExportError, ExportModel, File};
+use residyn_core::model::tree::{Drivetrain, Joint, Pose, recover, rounded};
 use residyn_core::sim::{RK4, SEMI_IMPLICIT_EULER, Scheme};
 
 /// A mechanism with its drives.
@@ -23,19 +22,6 @@ pub(crate) struct Mechanism {
     pub integrator: &'static str,
     /// Parts of the model that it does not carry.
     pub not_carried: Vec<String>,
-}
-
-/// A drive: torque = gear * clamp(gain * command + bias, -limit, limit).
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Drive {
-    pub gain: f64,
-    pub gear: f64,
-    /// A constant (N m or N), and slopes by position and velocity of the joint.
-    pub bias: [f64; 3],
-    /// N m or N, before the gear.
-    pub limit: Option<f64>,
-    /// Time constant in s.
-    pub lag: Option<f64>,
 }
 
 /// A body in the frame of its parent at q = 0.
@@ -69,12 +55,10 @@ impl Mechanism {
     /// Equations of an unknown mechanism, equations that depend on time, a network in their place, or a scheme that
     /// MuJoCo lacks.
     pub fn of(model: &ExportModel) -> Result<Self, String> {
-        if model.prior.is_some() {
-            return Err("a network replaces its equations".into());
-        }
-        if model.depends_on_time() {
-            return Err("its equations depend on time".into());
-        }
+        let Powertrains {
+            joints: powertrains,
+            mut not_carried,
+        } = Powertrains::of(model)?;
         let mut found = match model.system.mechanism(&model.equations.values()) {
             Some(chain) => chain,
             None => recover(&model.declared(), &model.system.prismatic)
@@ -86,70 +70,24 @@ impl Mechanism {
         for (joint, name) in found.joints.iter_mut().zip(&model.system.joint_names) {
             joint.name = escaped(name);
         }
-        let still = Drive {
-            gain: 1.0,
-            gear: 1.0,
-            bias: [0.0; 3],
-            limit: None,
-            lag: None,
-        };
-        let mut mechanism = Self {
-            drives: drives(model, &still)?,
+        for (joint, own) in found.joints.iter_mut().zip(&powertrains) {
+            joint.reference += own.zero;
+            joint.drivetrain = Drivetrain {
+                damping: joint.drivetrain.damping + own.joint.damping,
+                armature: joint.drivetrain.armature + own.joint.armature,
+                ..own.joint
+            };
+        }
+        if powertrains.iter().any(|own| own.joint.friction > 0.0) {
+            not_carried.push(DRY_FRICTION.into());
+        }
+        Ok(Self {
             joints: found.joints,
+            drives: powertrains.into_iter().map(|own| own.drive).collect(),
             gravity: found.gravity,
             integrator: integrator(model.integrator.scheme())?,
-            not_carried: Vec::new(),
-        };
-        // No constant torque can be added behind a limit.
-        let is_constant = |effect: &&ExportedEffect| effect.name == "constant_torque";
-        let (constant, others): (Vec<_>, Vec<_>) = model.effects.iter().partition(is_constant);
-        for effect in others.into_iter().chain(constant) {
-            mechanism.carry(effect, model);
-        }
-        if model.residual.is_some() {
-            mechanism
-                .not_carried
-                .push("the network that learns what the equations lack".into());
-        }
-        mechanism.not_carried.extend(model.sensors_not_carried());
-        let mut joints = mechanism.joints.iter();
-        if joints.any(|joint| joint.drivetrain.friction > 0.0) {
-            mechanism.not_carried.push(DRY_FRICTION.into());
-        }
-        Ok(mechanism)
-    }
-
-    fn carry(&mut self, effect: &ExportedEffect, model: &ExportModel) {
-        let parameters = &model.equations.parameters;
-        let value = |name: &String| value(parameters, name).unwrap_or(0.0);
-        let values: Vec<f64> = effect.parameters.iter().map(value).collect();
-        let (joints, drives) = (&mut self.joints, &mut self.drives);
-        let (joint, drive) = (&mut joints[effect.joint], &mut drives[effect.joint]);
-        match (effect.name.as_str(), &values[..]) {
-            ("viscous_friction", [b]) => joint.drivetrain.damping += b,
-            ("coulomb_friction", [level]) => joint.drivetrain.friction += level,
-            ("rotor_inertia", [inertia]) => joint.drivetrain.armature += inertia,
-            ("joint_spring", [stiffness, rest]) => {
-                joint.drivetrain.spring = Some(Spring {
-                    stiffness: *stiffness,
-                    rest: *rest,
-                });
-            }
-            ("gravity_tilt", [angle]) => joint.reference -= angle,
-            // A gain behind the limit is a gear.
-            ("actuator_gain", [excess]) if drive.limit.is_some() => drive.gear *= 1.0 + excess,
-            ("actuator_gain", [excess]) => drive.gain *= 1.0 + excess,
-            ("actuator_saturation", [limit]) => {
-                let behind = limit / drive.gear;
-                drive.limit = Some(drive.limit.map_or(behind, |own| own.min(behind)));
-            }
-            ("actuator_lag", [time]) => drive.lag = Some(*time),
-            ("constant_torque", [torque]) if drive.limit.is_none() => drive.bias[0] += torque,
-            _ => self.not_carried.push(format!(
-                "{} on joint {}: {}",
-                effect.name, effect.joint, effect.expression
-            )),
-        }
+            not_carried,
+        })
     }
 
     /// Places of the joints that this joint carries, or the base.
@@ -185,26 +123,6 @@ impl Mechanism {
     }
 }
 
-/// The drives of a model, all equal to `still` if torques are commanded.
-fn drives(model: &ExportModel, still: &Drive) -> Result<Vec<Drive>, String> {
-    let Some(program) = model.system.drive_program() else {
-        return Ok(vec![still.clone(); model.joints()]);
-    };
-    let values = model.equations.values();
-    let servos = servos(
-        &program,
-        model.joints(),
-        &values[..model.system.parameters.len()],
-    )?;
-    let drive = |servo: Servo| Drive {
-        gain: servo.gain,
-        bias: servo.bias,
-        limit: servo.limit,
-        ..still.clone()
-    };
-    Ok(servos.into_iter().map(drive).collect())
-}
-
 /// For each joint, the velocity (rad/s or m/s) over which dry friction reverses; 0 if it jumps.
 pub(crate) fn friction_widths(model: &ExportModel) -> String {
     numbers(model.system.smoothing_velocities())
@@ -225,9 +143,14 @@ pub(crate) fn option(model: &ExportModel, mechanism: &Mechanism) -> String {
     format!(
         "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
         numbers([0.0, 0.0, -mechanism.gravity]),
-        model.step_s / model.integrator.substeps() as f64,
+        mujoco_step_s(model),
         mechanism.integrator
     )
+}
+
+/// The step of the simulation, in s: commands are held over several.
+pub(crate) fn mujoco_step_s(model: &ExportModel) -> f64 {
+    model.step_s / model.integrator.substeps() as f64
 }
 
 /// XML declaration and provenance.

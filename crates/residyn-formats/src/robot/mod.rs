@@ -4,6 +4,7 @@
 pub(super) mod edit;
 pub(super) mod element;
 pub(super) mod mechanism;
+pub(super) mod powertrain;
 mod servo;
 pub(super) mod tree;
 pub(super) mod write_back;

@@ -18,6 +18,9 @@ pub(super) struct Servo {
 /// Command, position or velocity at which every limited drive is beyond its limit.
 const FAR: f64 = 1e9;
 
+/// Step of the slopes, near a millionth: a power of two, so that gains come out as they were declared.
+const STEP: f64 = 1.0 / (1 << 20) as f64;
+
 /// Number of points at which the form is compared with the drive, and the largest difference relative to the torques.
 const POINTS: usize = 256;
 const ROUNDING: f64 = 1e-9;
@@ -58,7 +61,7 @@ impl Servo {
         let ends = [at(2 * joints + j, FAR), at(2 * joints + j, -FAR)];
         let largest = ends.into_iter().map(f64::abs).fold(0.0, f64::max);
         // The difference over a step that is far from any limit, unless the drive is nothing but a limit.
-        let slope = |place: usize| (at(place, 1e-6) - at(place, -1e-6)) / 2e-6;
+        let slope = |place: usize| (at(place, STEP) - at(place, -STEP)) / (2.0 * STEP);
         let gain = slope(2 * joints + j);
         let is_limited = largest < 0.5 * gain.abs() * FAR;
         Self {

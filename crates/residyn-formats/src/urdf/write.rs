@@ -58,10 +58,11 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
         };
         lost(joint.drivetrain.armature > 0.0, "the rotor's inertia");
         lost(joint.drivetrain.spring.is_some(), "the spring");
+        lost(drive.delay.is_some(), "the drive's delay");
         lost(drive.lag.is_some(), "the drive's lag");
         lost(drive.bias != [0.0; 3], "what the drive adds to its command");
         #[allow(clippy::float_cmp)] // compared as set
-        lost(drive.gain != 1.0 || drive.gear != 1.0, "the drive's gain");
+        lost(drive.gain != 1.0, "the drive's gain");
     }
     lost
 }
@@ -89,7 +90,7 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
     {
         let parent = (joint.parent).map_or("base", |parent| &mechanism.joints[parent].body);
         text += &of_link(&joint.body, &link);
-        text += &of_joint(joint, &link, parent, drive.limit);
+        text += &of_joint(joint, &link, parent, drive.effort());
     }
     text + "</robot>\n"
 }

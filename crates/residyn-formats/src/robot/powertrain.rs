@@ -1,0 +1,177 @@
+//! What moves the joints of a model, as simulators represent it: drives that are linear up to a limit, and what a joint
+//! adds to its load.
+
+use super::servo::{Servo, servos};
+use super::value;
+use crate::{ExportModel, ExportedEffect};
+use residyn_core::model::tree::{Drivetrain, Spring};
+
+/// The powertrains of a model, one a joint.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Powertrains {
+    pub joints: Vec<Powertrain>,
+    /// Parts of the model beyond its declared equations that they do not hold.
+    pub not_carried: Vec<String>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Powertrain {
+    /// Damping, dry friction, rotor and spring.
+    pub joint: Drivetrain,
+    /// The coordinate (rad or m) at which the bodies are where the declared ones are at zero.
+    pub zero: f64,
+    pub drive: Drive,
+}
+
+/// A drive: torque = clamp(gain * command + bias), the command late and lagged.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Drive {
+    pub gain: f64,
+    /// A constant (N m or N), and slopes by position and velocity of the joint.
+    pub bias: [f64; 3],
+    /// Lowest and highest torque, N m or N.
+    pub range: Option<[f64; 2]>,
+    /// In s.
+    pub delay: Option<f64>,
+    /// Time constant in s.
+    pub lag: Option<f64>,
+}
+
+/// A position loop: torque = stiffness * (command - q) - damping * qd.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PositionLoop {
+    pub stiffness: f64,
+    pub damping: f64,
+}
+
+/// Largest difference between a drive's gain and its slope by position, relative to the gain, in a position loop: slopes are
+/// differences of torques.
+const ROUNDING: f64 = 1e-9;
+
+impl Powertrains {
+    /// The powertrains of a model.
+    ///
+    /// # Errors
+    /// A network in place of the equations, equations that depend on time, or drives of another form.
+    pub fn of(model: &ExportModel) -> Result<Self, String> {
+        if model.prior.is_some() {
+            return Err("a network replaces its equations".into());
+        }
+        if model.depends_on_time() {
+            return Err("its equations depend on time".into());
+        }
+        let joints = drives(model)?.into_iter().map(|drive| Powertrain {
+            joint: Drivetrain::default(),
+            zero: 0.0,
+            drive,
+        });
+        let mut powertrains = Self {
+            joints: joints.collect(),
+            not_carried: Vec::new(),
+        };
+        // A constant torque acts behind limits and gains, wherever the file states it.
+        let is_constant = |effect: &&ExportedEffect| effect.name == "constant_torque";
+        let (constant, others): (Vec<_>, Vec<_>) = model.effects.iter().partition(is_constant);
+        for effect in others.into_iter().chain(constant) {
+            powertrains.carry(effect, model);
+        }
+        let lost = &mut powertrains.not_carried;
+        if model.residual.is_some() {
+            lost.push("the network that learns what the equations lack".into());
+        }
+        lost.extend(model.sensors_not_carried());
+        Ok(powertrains)
+    }
+
+    fn carry(&mut self, effect: &ExportedEffect, model: &ExportModel) {
+        let parameters = &model.equations.parameters;
+        let value = |name: &String| value(parameters, name).unwrap_or(0.0);
+        let values: Vec<f64> = effect.parameters.iter().map(value).collect();
+        let Powertrain { joint, zero, drive } = &mut self.joints[effect.joint.index()];
+        match (effect.name.as_str(), &values[..]) {
+            ("viscous_friction", [b]) => joint.damping += b,
+            ("coulomb_friction", [level]) => joint.friction += level,
+            ("rotor_inertia", [inertia]) => joint.armature += inertia,
+            ("joint_spring", [stiffness, rest]) => {
+                joint.spring = Some(Spring {
+                    stiffness: *stiffness,
+                    rest: *rest,
+                });
+            }
+            ("gravity_tilt", [angle]) => *zero -= angle,
+            ("sensor_offset", [offset]) => *zero += offset,
+            ("actuator_gain", [excess]) => drive.scale(1.0 + excess),
+            ("actuator_saturation", [limit]) => drive.limit(*limit),
+            ("actuator_delay", [time]) => drive.delay = Some(*time).filter(|time| *time > 0.0),
+            ("actuator_lag", [time]) => drive.lag = Some(*time),
+            ("constant_torque", [torque]) => drive.add(*torque),
+            _ => self.not_carried.push(format!(
+                "{} on joint {}: {}",
+                effect.name,
+                model.system.joint_label(effect.joint),
+                effect.expression
+            )),
+        }
+    }
+}
+
+impl Drive {
+    /// What the commanded torque does.
+    const DIRECT: Self = Self {
+        gain: 1.0,
+        bias: [0.0; 3],
+        range: None,
+        delay: None,
+        lag: None,
+    };
+
+    fn of(servo: Servo) -> Self {
+        Self {
+            gain: servo.gain,
+            bias: servo.bias,
+            range: servo.limit.map(|limit| [-limit, limit]),
+            ..Self::DIRECT
+        }
+    }
+
+    fn scale(&mut self, factor: f64) {
+        self.gain *= factor;
+        self.bias = self.bias.map(|slope| slope * factor);
+        self.range = self.range.map(|range| range.map(|end| end * factor));
+    }
+
+    fn limit(&mut self, limit: f64) {
+        let [low, high] = self.range.unwrap_or([-limit, limit]);
+        self.range = Some([low.max(-limit), high.min(limit)]);
+    }
+
+    fn add(&mut self, torque: f64) {
+        self.bias[0] += torque;
+        self.range = self.range.map(|range| range.map(|end| end + torque));
+    }
+
+    /// The largest torque of either sign without the constant, N m or N.
+    pub fn effort(&self) -> Option<f64> {
+        self.range.map(|[low, high]| 0.5 * (high - low))
+    }
+
+    /// The position loop, constant aside, if the drive is one.
+    pub fn position_loop(&self) -> Option<PositionLoop> {
+        let [_, by_position, by_velocity] = self.bias;
+        let holds = (self.gain + by_position).abs() <= ROUNDING * self.gain;
+        (holds && self.gain > 0.0).then_some(PositionLoop {
+            stiffness: self.gain,
+            damping: -by_velocity,
+        })
+    }
+}
+
+/// The drives of a model's joints, without effects.
+fn drives(model: &ExportModel) -> Result<Vec<Drive>, String> {
+    let Some(program) = model.system.drive_program() else {
+        return Ok(vec![Drive::DIRECT; model.joints()]);
+    };
+    let declared = &model.equations.values()[..model.system.parameters.len()];
+    let servos = servos(&program, model.joints(), declared)?;
+    Ok(servos.into_iter().map(Drive::of).collect())
+}
