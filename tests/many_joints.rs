@@ -75,6 +75,7 @@ fn quadruped() -> Value {
     report["of_joints"] = all().map(gain).collect();
     report["alternatives"] = all().map(rival).collect();
     report["torque"] = Value::Null;
+    report["calibration"] = Value::Null;
     report["error"]["by_log"] = json!([]);
     for model in [
         "declared",
@@ -145,7 +146,7 @@ fn the_text_has_one_table_of_joints_by_effects() {
     ];
     assert_eq!(rows.iter().map(named).take(5).collect::<Vec<_>>(), order);
     assert!(
-        rows[0].ends_with("| **0.300** | 20.0 | 0.0100 |"),
+        rows[0].ends_with("| **0.300** | 20.0 | 0.01000 |"),
         "{}",
         rows[0]
     );

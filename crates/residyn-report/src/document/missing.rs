@@ -13,7 +13,8 @@ pub(super) fn answer(report: &Report) -> Vec<Block> {
         false => Boxed("cards", cards.collect()),
     };
     let known = [found].into_iter().chain(supported(report));
-    known.chain(equations(report)).collect()
+    let title = [heading("The equations")];
+    known.chain(title).chain(equations(report)).collect()
 }
 
 pub(super) fn card(report: &Report, effect: &EffectEntry) -> Block {
@@ -90,6 +91,5 @@ pub(super) fn equations(report: &Report) -> Vec<Block> {
         let about = format!("new, {}: {}", effect.enters, effect.named());
         Boxed("new", vec![Small(about), added(effect)])
     });
-    let title = [heading("The equations")];
-    title.into_iter().chain(declared).chain(new).collect()
+    declared.chain(new).collect()
 }

@@ -194,9 +194,10 @@ impl EffectEntry {
 /// A parameter's name without its joint's number, and without the effect that it is distinguished by: `F_c` of `F_c12`, `kp` of
 /// `kp_12`.
 fn stem(name: &str, of: &str, joint: Joint) -> String {
-    let name = name.strip_prefix(&format!("{of}_")).unwrap_or(name);
     let name = name.strip_suffix(&joint.to_string()).unwrap_or(name);
-    name.trim_end_matches('_').to_owned()
+    let name = name.trim_end_matches('_');
+    let own = name.strip_prefix(of).and_then(|own| own.strip_prefix('_'));
+    own.unwrap_or(name).to_owned()
 }
 
 /// All joints, like ones side by side, each with whether a group of its own begins with it.
@@ -266,14 +267,15 @@ mod tests {
     #[test]
     fn numbers_of_joints_are_no_part_of_symbols() {
         let joint = Joint::at(11);
-        for (name, bare) in [
-            ("F_c12", "F_c"),
-            ("tau_012", "tau_0"),
-            ("kp_12", "kp"),
-            ("coulomb_friction_F_c12", "F_c"),
-            ("stiffness", "stiffness"),
+        for (of, name, bare) in [
+            ("coulomb_friction", "F_c12", "F_c"),
+            ("coulomb_friction", "coulomb_friction_F_c12", "F_c"),
+            ("constant_torque", "tau_012", "tau_0"),
+            ("kp", "kp_12", "kp"),
+            ("", "kp_12", "kp"),
+            ("", "stiffness", "stiffness"),
         ] {
-            assert_eq!(stem(name, "coulomb_friction", joint), bare);
+            assert_eq!(stem(name, of, joint), bare);
         }
     }
 }
