@@ -34,6 +34,7 @@ mod interrupts;
 mod layout;
 mod log_formats;
 mod logs;
+mod many_joints;
 mod mechanism;
 mod memory;
 mod metric;

@@ -166,7 +166,7 @@ fn drawable(error: f64) -> f64 {
     }
 }
 
-fn written(error: f64, kind: JointKind) -> String {
+pub(crate) fn written(error: f64, kind: JointKind) -> String {
     if !error.is_finite() {
         return "diverged".to_owned();
     }
@@ -175,7 +175,7 @@ fn written(error: f64, kind: JointKind) -> String {
 }
 
 /// The factor and the unit's name: errors below one are in thousandths.
-fn readable(error: f64, unit: &str) -> (f64, String) {
+pub(crate) fn readable(error: f64, unit: &str) -> (f64, String) {
     if error < 1.0 {
         (1e3, format!("m{unit}"))
     } else {

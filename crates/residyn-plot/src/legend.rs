@@ -18,6 +18,8 @@ pub(crate) enum Sample {
     Point(&'static str),
     /// A filled bar of a colour.
     Bar(&'static str),
+    /// A dot with a rim, of a colour.
+    Dot(&'static str),
     /// The mark at the start of a piece of a curve.
     Start,
     /// A line in its band.
@@ -105,6 +107,7 @@ fn sample(sample: Sample, x: f64, y: f64) -> Group {
                 .set("height", 11)
                 .set("fill", colour),
         ),
+        Sample::Dot(colour) => group.add(marker(centre, 5.0, colour)),
         Sample::Start => group.add(marker(centre, START_MARK_PX, INK)),
         Sample::Band(stroke) => {
             let (right, low, high) = (x + SAMPLE_PX, y + 6.0, y - 6.0);

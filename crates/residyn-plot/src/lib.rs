@@ -1,8 +1,8 @@
 //! The report's figures, as SVG text.
 //!
-//! Four figures: what a model predicts against what was measured ([`predictions`]), the force it leaves
-//! unexplained ([`residual_shape`]), how far off it is ([`error_bars`]), and what a planner gains with it as it
-//! learns ([`learning_curves`]). They take plain numbers and return a complete SVG document; the caller writes it. A
+//! What a model predicts against what was measured ([`predictions`]), the force it leaves unexplained
+//! ([`residual_shape`]), how far off it is ([`error_bars`], [`error_dots`] for many joints), and what a planner gains
+//! with it as it learns ([`learning_curves`]). They take plain numbers and return a complete SVG document; the caller writes it. A
 //! [`Role`] or a [`Method`] has the same colour and line in every figure.
 //!
 //! The documents carry no identifiers and no style sheets, so that several can stand in one HTML page, and name
@@ -12,6 +12,7 @@ mod axes;
 mod canvas;
 mod decimate;
 mod error_bars;
+mod error_dots;
 mod learning;
 mod legend;
 mod predictions;
@@ -22,6 +23,7 @@ mod style;
 pub use axes::Quantity;
 pub use decimate::bends;
 pub use error_bars::{Bar, ErrorRow, error_bars};
+pub use error_dots::error_dots;
 pub use learning::{Course, LearningPanel, Method, MethodCurve, Spread, learning_curves};
 pub use predictions::{Panel, Track, predictions};
 pub use residual_shape::{ShapeCurve, ShapeModel, ShapePanel, ShapeSample, residual_shape};

@@ -3,6 +3,7 @@
 use super::by_log::{by_log, ranges};
 use super::calibration::CalibrationEntry;
 use super::headline::{headline, place};
+use super::overview::{declared, differences, found, of_joints};
 use super::plot_data::PlotData;
 use super::schema::{
     AlternativeEntry, AuditEntry, CombinationEntry, ContenderEntry, ContradictedEntry, EffectEntry,
@@ -15,7 +16,7 @@ use residyn_core::closeloop::{
 };
 use residyn_core::data::{Audit, Joint, Log};
 use residyn_core::identify::{Combination, Fit, FitError};
-use residyn_core::model::{FittedEffect, Model, Origin, Parameter, PerLogValue};
+use residyn_core::model::{FittedEffect, Model, Origin, Parameter, PerLogValue, like_joints};
 use residyn_core::sim::metric::{Assessment, Summary, summarise};
 
 /// Names of the files in the folder of a report.
@@ -32,6 +33,10 @@ impl Report {
     pub fn new(outcome: &Outcome, origin: &Origin) -> Self {
         let model = outcome.models.after.model.absorbed();
         let by_log = by_log(outcome);
+        let like = like_joints(&model.joint_names);
+        let declared = declared(outcome, &model);
+        let of_joints = of_joints(&declared);
+        let all: Vec<_> = found(outcome).into_iter().chain(declared).collect();
         Self {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -42,6 +47,8 @@ impl Report {
             system: model.name.clone(),
             joints: model.joints,
             joint_names: joint_names(&model),
+            differences: differences(&like, &all),
+            like_joints: like,
             prismatic: outcome.given.prismatic.clone(),
             driven_by: model.driven_by().key().to_owned(),
             verdict: outcome.verdict,
@@ -55,6 +62,7 @@ impl Report {
             unexplained: left(outcome),
             equations: model.latex(),
             parameters: refitted(outcome, &model),
+            of_joints,
             ranges: ranges(outcome, &by_log),
             by_log,
             contradicted: outcome

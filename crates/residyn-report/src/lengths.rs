@@ -2,6 +2,7 @@
 
 use super::motion::MotionEntry;
 use super::schema::{ErrorEntry, ModelError, Report};
+use residyn_core::data::Joint;
 
 /// The number of entries that a list must have, and the number that it has.
 type Length = [usize; 2];
@@ -26,6 +27,8 @@ impl Report {
             let models = fitted.into_iter().chain(&torque.with_friction);
             lengths.extend(models.map(|model| [joints, model.rms.len()]));
         }
+        let groups = self.like_joints.iter();
+        lengths.extend(groups.filter(|group| group.is_empty()).map(|_| [1, 0]));
         if let Some(motion) = &self.plots.motion {
             lengths.extend(motion.lengths());
         }
@@ -33,9 +36,19 @@ impl Report {
         if let Some([wanted, found]) = off {
             return Some(format!("a list has {found} entries instead of {wanted}"));
         }
-        let mut scatters = self.plots.residuals.iter();
-        let strange = scatters.find(|cloud| !cloud.joint.is_of(joints))?;
-        Some(format!("it has no joint {}", strange.joint))
+        let strange = self.mentioned().find(|joint| !joint.is_of(joints))?;
+        Some(format!("it has no joint {strange}"))
+    }
+}
+
+impl Report {
+    /// Joints by which pages look up a name or a row.
+    fn mentioned(&self) -> impl Iterator<Item = Joint> {
+        let drawn = self.plots.residuals.iter().map(|cloud| cloud.joint);
+        let like = self.like_joints.iter().flatten().copied();
+        let differ = self.differences.iter();
+        let differ = differ.flat_map(|one| one.joints.iter().chain(&one.others).copied());
+        drawn.chain(like).chain(differ)
     }
 }
 

@@ -10,6 +10,7 @@ mod json;
 mod lengths;
 mod model_file;
 mod motion;
+mod overview;
 mod page;
 mod picture;
 mod plot_data;

@@ -1,11 +1,13 @@
 //! The report's plots: which parts of an outcome go into which chart.
 
 use super::headline::label;
+use super::overview::{in_order, is_large};
 use super::plot_data::{Rows, Series, series, windows};
 use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
 use residyn_core::closeloop::{ErrorModel, ForceSample, Outcome, ResidualForce};
 use residyn_core::data::Joint;
 use residyn_core::identify::FitError;
+use residyn_core::model::like_joints;
 use residyn_core::sim::metric::{Assessment, summarise};
 use residyn_plot::{
     Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapeModel, ShapePanel,
@@ -138,7 +140,8 @@ fn shape(
 }
 
 /// Open-loop errors at each horizon, of the fitted models and of those scored as they are. The declared model
-/// as written is left to the tables: its values may be guesses, whose bar would dwarf all others.
+/// as written is left to the tables: its values may be guesses, whose bar would dwarf all others. Of many joints, one chart
+/// shows the middle horizon.
 pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
     let joints = outcome.models.after.model.joints;
     let errors = &outcome.errors;
@@ -167,9 +170,19 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
             })
             .collect(),
     };
+    let horizons = errors.before.horizons.len();
+    let title = "Open-loop position error on the test logs";
+    if is_large(joints) {
+        let middle = horizons / 2;
+        let like = like_joints(&outcome.models.after.model.joint_names);
+        let ordered = in_order(joints, &like).into_iter();
+        let rows: Vec<ErrorRow> = ordered.map(|(joint, _)| row(joint, middle)).collect();
+        let horizon_s = errors.before.horizons[middle].horizon_s;
+        return residyn_plot::error_dots(&rows, &format!("{title}, {horizon_s} s ahead"));
+    }
     let rows: Vec<ErrorRow> = Joint::all(joints)
-        .flat_map(|joint| (0..errors.before.horizons.len()).map(move |h| (joint, h)))
+        .flat_map(|joint| (0..horizons).map(move |h| (joint, h)))
         .map(|(joint, h)| row(joint, h))
         .collect();
-    residyn_plot::error_bars(&rows, "Open-loop position error on the test logs")
+    residyn_plot::error_bars(&rows, title)
 }

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::by_log::{OfLogEntry, RangeEntry};
 use super::calibration::CalibrationEntry;
+use super::overview::{DifferenceEntry, OfJointEntry};
 use super::plot_data::PlotData;
 use residyn_core::closeloop::{
     Curve, ErrorModel, NetworkCheck, Proposal, Separation, Settings, SplitMethod, TestLog,
@@ -52,6 +53,9 @@ pub struct Report {
     pub(super) joints: usize,
     /// names of the joints in the model file or URDF, in order; q1, q2 .. if they have none
     pub(super) joint_names: Vec<String>,
+    /// groups of joints that are built alike, by their names
+    #[serde(default)]
+    pub(super) like_joints: Vec<Vec<Joint>>,
     /// for each joint whether it slides (m, N) rather than turns (rad, N m)
     pub(super) prismatic: Vec<bool>,
     /// the quantity by which logs command the joints: `tau`, or `cmd` of a drive
@@ -68,11 +72,17 @@ pub struct Report {
     /// effects that lower the error on logs left out of the fit without being established: the model has them, but do
     /// not rely on their names
     pub(super) supported: Vec<EffectEntry>,
+    /// where joints that are built alike differ, the largest difference first
+    #[serde(default)]
+    pub(super) differences: Vec<DifferenceEntry>,
     pub(super) unexplained: UnexplainedEntry,
     /// the declared equations in LaTeX, one per line; for a chain of bodies, their form
     pub(super) equations: Vec<String>,
     /// parameters of the declared equations, as refitted
     pub(super) parameters: Vec<RefittedEntry>,
+    /// free values of the model file that belong to one joint: of its drive, and of the effects that the file declares
+    #[serde(default)]
+    pub(super) of_joints: Vec<OfJointEntry>,
     /// the model with effects, fitted to each training log alone; empty for a single log and for more than 32
     pub(super) by_log: Vec<OfLogEntry>,
     /// ranges of this rig's values from run to run; also in ranges.json
@@ -384,6 +394,12 @@ impl ModelError {
     pub fn of_all(&self, horizon: usize) -> f64 {
         let squares = self.position_rmse[horizon].iter().map(|rmse| rmse * rmse);
         squares.sum::<f64>().sqrt()
+    }
+
+    /// As above, but the root of the mean over joints: the size of the error of one joint.
+    #[allow(clippy::cast_precision_loss)] // few joints
+    pub fn of_a_joint(&self, horizon: usize) -> f64 {
+        self.of_all(horizon) / (self.position_rmse[horizon].len() as f64).sqrt()
     }
 }
 

@@ -13,18 +13,23 @@ pub fn text(report: &Report) -> String {
     } = document(report);
     let sections = sections
         .iter()
-        .map(|section| format!("## {}\n\n{}", section.question, all(&section.answer)));
-    let whole = format!("# {about}: {headline}\n\n{}", all(&head)) + &sections.collect::<String>();
+        .map(|section| format!("## {}\n\n{}", section.question, all(&section.answer, TOP)));
+    let whole =
+        format!("# {about}: {headline}\n\n{}", all(&head, TOP)) + &sections.collect::<String>();
     whole.trim_end().to_owned() + "\n"
 }
 
-fn all(blocks: &[Block]) -> String {
-    blocks.iter().map(markdown).collect()
+/// The level of headings below a section's.
+const TOP: usize = 3;
+
+fn all(blocks: &[Block], level: usize) -> String {
+    blocks.iter().map(|block| markdown(block, level)).collect()
 }
 
-fn markdown(block: &Block) -> String {
+fn markdown(block: &Block, level: usize) -> String {
+    let heading = |text: &str| format!("{} {text}\n\n", "#".repeat(level));
     match block {
-        Block::Heading(text) => format!("### {text}\n\n"),
+        Block::Heading(text) => heading(text),
         Block::Paragraph(text) | Block::Small(text) | Block::Serious(text) => {
             format!("{text}\n\n")
         }
@@ -36,8 +41,9 @@ fn markdown(block: &Block) -> String {
             Some(plain) => format!("`{plain}`\n\n"),
             None => format!("$$\n{latex}\n$$\n\n"),
         },
-        Block::Boxed(_, blocks) => all(blocks),
-        Block::Folded { about, blocks, .. } => format!("**{about}**\n\n{}", all(blocks)),
+        Block::Boxed(_, blocks) => all(blocks, level),
+        Block::Part { about, blocks, .. } => heading(about) + &all(blocks, level + 1),
+        Block::Folded { about, blocks, .. } => format!("**{about}**\n\n{}", all(blocks, level)),
         Block::Drawn { files, .. } => {
             let picture = |file: &&str| format!("![{}]({file})\n\n", file.trim_end_matches(".svg"));
             files.iter().map(picture).collect()

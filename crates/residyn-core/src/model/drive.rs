@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use super::Parameter;
 use super::assemble::lower;
 use super::reader::{FileError, Located, Section};
 use super::system::{Equations, Model};
@@ -75,6 +76,19 @@ impl Model {
         }
     }
 
+    /// The parameters that this joint's drive mentions and no other joint's does.
+    pub fn drive_parameters(&self, joint: Joint) -> Vec<&Parameter> {
+        let Some(drive) = &self.equations.drive else {
+            return Vec::new();
+        };
+        let mentions = |of: Joint, name: &str| drive.0[of].value.names().contains(&name);
+        let is_own = |parameter: &&Parameter| {
+            let mut joints = Joint::all(self.joints);
+            joints.all(|other| mentions(other, &parameter.name) == (other == joint))
+        };
+        self.parameters.iter().filter(is_own).collect()
+    }
+
     /// The names that formulas of `[drive]` may use.
     pub(super) fn drive_names(&self) -> Vec<String> {
         self.names_under(Quantity::Command)
@@ -138,5 +152,26 @@ impl Model {
         let scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
         let torques = drive.torques(&mut graph, &scope);
         Some(graph.finish(&torques))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::data::Joint;
+    use crate::model::Library;
+
+    #[test]
+    fn constants_of_one_drive_belong_to_its_joint() {
+        let text = "[system]\nname = \"pair\"\njoints = 2\n[parameters]\nkp = { value = 1.0 }\nkd_1 = { value = 1.0 }\nkd_2 = { value = 1.0 }\nJ = { value = 1.0 }\n\
+            [drive]\ntau1 = \"kp*(cmd1 - q1) - kd_1*qd1\"\ntau2 = \"kp*(cmd2 - q2) - kd_2*qd2\"\n\
+            [dynamics]\nqdd1 = \"tau1/J\"\nqdd2 = \"tau2/J\"\n";
+        let model = Library::built_in()
+            .model_from_text("pair.toml", text)
+            .unwrap();
+        let names = |joint: usize| -> Vec<&str> {
+            let own = model.drive_parameters(Joint::at(joint)).into_iter();
+            own.map(|parameter| parameter.name.as_str()).collect()
+        };
+        assert_eq!([names(0), names(1)], [["kd_1"], ["kd_2"]]);
     }
 }

@@ -19,6 +19,13 @@ pub(super) const PLACE: [&str; 3] = ["x", "y", "z"];
 const COMMANDS: i32 = 60;
 const COMMAND_STEP: f64 = 0.05;
 
+/// Angle, speed, torque and load at which an effect is compared with its mirror image.
+const MIRRORED: [[f64; 4]; 3] = [
+    [0.3, 0.7, 0.5, 0.4],
+    [-0.8, 1.3, -0.2, 0.9],
+    [1.7, -0.1, 1.1, -0.6],
+];
+
 /// A physical effect that a model may lack: one file of `models/effects`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
@@ -332,6 +339,36 @@ impl Effect {
         acting.is_sorted_by(|less, more| less < more)
     }
 
+    /// Whether the effect acts alike on a joint and on its mirror image: with the joint's axis turned round, the same values of
+    /// its parameters do the same. Where they do not, the values of like joints on opposite sides differ in sign or swap.
+    pub fn is_mirror_symmetric(&self) -> bool {
+        let (formula, sign) = match &self.entry {
+            Entry::Force(formula) | Entry::Torque(formula) => (formula, -1.0),
+            Entry::Inertia(formula) => (formula, 1.0),
+            Entry::Command(_) => return true,
+            _ => return false,
+        };
+        // With equal values, a friction with one level for each direction would look like one with a single level.
+        let values = self.parameters.iter().zip(1..);
+        let values: Vec<f64> = values
+            .map(|(parameter, k)| parameter.typical * (1.0 + 0.1 * f64::from(k)))
+            .collect();
+        let turned = |[q, qd, tau, load]: [f64; 4], turn: f64| {
+            let of_joint = |name: &str| match name {
+                "q" => turn * q,
+                "qd" => turn * qd,
+                "tau" => turn * tau,
+                "load" => turn * load,
+                _ => 1.0,
+            };
+            self.evaluate(formula, &values, of_joint)
+        };
+        MIRRORED.into_iter().all(|at| {
+            let (as_is, mirrored) = (turned(at, 1.0), turned(at, -1.0));
+            (mirrored - sign * as_is).abs() <= 1e-9 * (1.0 + as_is.abs())
+        })
+    }
+
     /// Whether the effect belongs to the sensor of an angle, not to the rig: its parameters change from log to log.
     pub fn is_of_sensor(&self) -> bool {
         matches!(self.entry, Entry::Angle(_)) && self.parameters.iter().all(|p| p.per_log)
@@ -373,6 +410,32 @@ mod tests {
             "actuator_delay",
         ] {
             assert_eq!(over(other, &[]), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn an_effect_with_a_direction_is_not_mirror_symmetric() {
+        let library = Library::built_in();
+        let has = |name: &str| library.effect(name).unwrap().is_mirror_symmetric();
+        for symmetric in [
+            "coulomb_friction",
+            "stribeck_friction",
+            "load_friction",
+            "actuator_delay",
+            "actuator_gain",
+            "rotor_inertia",
+        ] {
+            assert!(has(symmetric), "{symmetric}");
+        }
+        for directed in [
+            "asymmetric_friction",
+            "constant_torque",
+            "joint_spring",
+            "cogging_torque",
+            "sensor_offset",
+            "payload",
+        ] {
+            assert!(!has(directed), "{directed}");
         }
     }
 

@@ -17,6 +17,7 @@ mod filter;
 mod fitted;
 mod input_layout;
 mod library;
+mod like;
 mod limb;
 mod network;
 mod reader;
@@ -42,6 +43,7 @@ pub use filter::{CommandFilter, Filter};
 pub use fitted::{FittedEffect, Status};
 pub use input_layout::InputLayout;
 pub use library::Library;
+pub use like::like_joints;
 pub use network::to_f32;
 pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,

@@ -1,6 +1,7 @@
 //! How much better: the errors on logs that were never fitted.
 
-use super::{Block, Cell, cell, heading, paragraph, paragraphs, table};
+use super::{Block, Cell, cell, folded_if_large, heading, paragraph, paragraphs, table};
+use crate::overview::is_large;
 use crate::schema::{ErrorEntry, ModelError, Report};
 use crate::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_FRICTION, WITH_NETWORK, ZEROED, capitalised, listed,
@@ -117,7 +118,18 @@ fn ratio(after: f64, before: f64) -> Cell {
     }
 }
 
-fn of_torques(report: &Report, errors: &TorqueErrors) -> Vec<Block> {
+/// The errors of one joint.
+pub(super) fn of_joint(report: &Report, joint: Joint) -> Vec<Block> {
+    let torques = report.torque.iter();
+    let torques = torques.map(|errors| torque_table(report, errors, &[joint]));
+    [motion_table(report, &[joint])]
+        .into_iter()
+        .chain(torques)
+        .collect()
+}
+
+/// A row for each of these joints, and one for all.
+fn torque_table(report: &Report, errors: &TorqueErrors, joints: &[Joint]) -> Block {
     let mut models = vec![(AS_WRITTEN, &errors.declared), (FITTED, &errors.before)];
     models.extend(errors.with_friction.iter().map(|m| (WITH_FRICTION, m)));
     models.push((WITH_EFFECTS, &errors.after));
@@ -140,8 +152,12 @@ fn of_torques(report: &Report, errors: &TorqueErrors) -> Vec<Block> {
     );
     let names = models.iter().map(|(name, _)| *name);
     let heads = ["joint"].into_iter().chain(names).chain([RATIO]);
-    let rows = Joint::all(report.joints).map(of_joint).chain([all]);
-    let table = table(1, heads, rows);
+    table(1, heads, joints.iter().copied().map(of_joint).chain([all]))
+}
+
+fn of_torques(report: &Report, errors: &TorqueErrors) -> Vec<Block> {
+    let joints: Vec<Joint> = Joint::all(report.joints).collect();
+    let table = torque_table(report, errors, &joints);
     let remarks = [
         bootstrapped(errors.reduction_ci95, "error"),
         repeated(report),
@@ -152,7 +168,8 @@ fn of_torques(report: &Report, errors: &TorqueErrors) -> Vec<Block> {
     );
     let title = heading("Torques that the motion needs");
     let remarks = paragraphs(remarks.into_iter().flatten());
-    [vec![title, paragraph(about), table], remarks].concat()
+    let table = folded_if_large(report, "The torques of each joint", vec![table]);
+    [vec![title, paragraph(about)], table, remarks].concat()
 }
 
 /// What the error says on test logs that repeat the motion of others.
@@ -205,7 +222,8 @@ fn scored(error: &ErrorEntry) -> Vec<(&str, &ModelError)> {
     models
 }
 
-fn of_motion(report: &Report) -> Vec<Block> {
+/// A row for each horizon and each of these joints.
+fn motion_table(report: &Report, joints: &[Joint]) -> Block {
     let error = &report.error;
     let models = scored(error);
     let names = models.iter().map(|(name, _)| *name);
@@ -227,8 +245,49 @@ fn of_motion(report: &Report) -> Vec<Block> {
         cells.chain([share]).collect()
     };
     let horizons = 0..error.horizons_s.len();
-    let rows = horizons.flat_map(|h| Joint::all(report.joints).map(move |joint| (h, joint)));
-    let table = table(2, heads, rows.map(row));
+    let rows = horizons.flat_map(|h| joints.iter().map(move |joint| (h, *joint)));
+    table(2, heads, rows.map(row))
+}
+
+/// A row for each horizon, of all joints together.
+fn motion_of_all(report: &Report) -> Block {
+    let error = &report.error;
+    let models = scored(error);
+    let names = models.iter().map(|(name, _)| *name);
+    let row = |h: usize| {
+        let first = [
+            format!("{} s", error.horizons_s[h]),
+            error.before.windows[h].to_string(),
+        ];
+        let errors = models.iter().map(|(_, model)| small(model.of_a_joint(h)));
+        let share = ratio(error.after.of_a_joint(h), error.before.of_a_joint(h));
+        first
+            .into_iter()
+            .chain(errors)
+            .map(cell)
+            .chain([share])
+            .collect()
+    };
+    let heads = ["horizon", "windows"]
+        .into_iter()
+        .chain(names)
+        .chain([RATIO]);
+    table(1, heads, (0..error.horizons_s.len()).map(row))
+}
+
+fn of_motion(report: &Report) -> Vec<Block> {
+    let error = &report.error;
+    let models = scored(error);
+    let joints: Vec<Joint> = Joint::all(report.joints).collect();
+    let of_all = is_large(report.joints).then(|| {
+        let about = "Root mean square over the joints:";
+        vec![paragraph(about), motion_of_all(report)]
+    });
+    let each = vec![motion_table(report, &joints)];
+    let tables = [
+        of_all.unwrap_or_default(),
+        folded_if_large(report, "The motion of each joint", each),
+    ];
     let horizon = format!("error at {} s", error.middle().1);
     let remarks = [
         bootstrapped(error.reduction_ci95, &horizon),
@@ -245,7 +304,8 @@ fn of_motion(report: &Report) -> Vec<Block> {
     let remarks = remarks.into_iter().flatten();
     let remarks = paragraphs(remarks.chain(diverged).chain(unscored));
     let title = heading("Open-loop motion");
-    [vec![title, paragraph(about_motion(report)), table], remarks].concat()
+    let about = vec![title, paragraph(about_motion(report))];
+    [about, tables.concat(), remarks].concat()
 }
 
 /// What the noise of the sensors alone would leave.
@@ -365,13 +425,12 @@ fn of_test_logs(report: &Report) -> Vec<Block> {
         };
         Joint::all(report.joints).map(row).collect()
     };
-    vec![
-        heading("Log by log"),
-        paragraph(about),
-        table(
-            2,
-            ["log", "joint", FITTED, WITH_EFFECTS, RATIO],
-            error.by_log.iter().flat_map(of_log),
-        ),
-    ]
+    let rows = error.by_log.iter().flat_map(of_log);
+    let heads = ["log", "joint", FITTED, WITH_EFFECTS, RATIO];
+    let table = folded_if_large(
+        report,
+        "Each joint on each log",
+        vec![table(2, heads, rows)],
+    );
+    [vec![heading("Log by log"), paragraph(about)], table].concat()
 }

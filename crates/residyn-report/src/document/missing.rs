@@ -13,10 +13,11 @@ pub(super) fn answer(report: &Report) -> Vec<Block> {
         false => Boxed("cards", cards.collect()),
     };
     let known = [found].into_iter().chain(supported(report));
-    known.chain(equations(report)).collect()
+    let title = [heading("The equations")];
+    known.chain(title).chain(equations(report)).collect()
 }
 
-fn card(report: &Report, effect: &EffectEntry) -> Block {
+pub(super) fn card(report: &Report, effect: &EffectEntry) -> Block {
     let error = match report.compared {
         ErrorModel::OutputError => "position error on the test logs, at the middle horizon,",
         ErrorModel::InverseDynamics => "torque error on the test logs",
@@ -58,27 +59,28 @@ fn removed(effect: &EffectEntry) -> String {
 }
 
 fn supported(report: &Report) -> Option<Block> {
-    let item = |effect: &EffectEntry| {
-        format!(
-            "**{}** on joint {}, {}: {}.",
-            effect.title,
-            effect.place,
-            values(&effect.parameters),
-            effect.not_established.as_deref().unwrap_or_default()
-        )
-    };
     let effects = &report.supported;
     (!effects.is_empty()).then(|| {
         let about = "These lower the loss on blocks left out of the fit and are in the model, but do not rely on their names.";
         folded(
             format!("Supported, not established: {}", effects.len()),
-            vec![paragraph(about), List(effects.iter().map(item).collect())],
+            vec![paragraph(about), List(effects.iter().map(supported_item).collect())],
         )
     })
 }
 
+pub(super) fn supported_item(effect: &EffectEntry) -> String {
+    format!(
+        "**{}** on joint {}, {}: {}.",
+        effect.title,
+        effect.place,
+        values(&effect.parameters),
+        effect.not_established.as_deref().unwrap_or_default()
+    )
+}
+
 /// The declared equations, then what was added, marked.
-fn equations(report: &Report) -> Vec<Block> {
+pub(super) fn equations(report: &Report) -> Vec<Block> {
     let declared = report.equations.iter().map(|line| Formula {
         // A row of an `align` environment on its own.
         latex: line.replace("&=", "="),
@@ -89,6 +91,5 @@ fn equations(report: &Report) -> Vec<Block> {
         let about = format!("new, {}: {}", effect.enters, effect.named());
         Boxed("new", vec![Small(about), added(effect)])
     });
-    let title = [heading("The equations")];
-    title.into_iter().chain(declared).chain(new).collect()
+    declared.chain(new).collect()
 }

@@ -5,16 +5,19 @@
 mod better;
 mod bodies;
 mod calibration;
+mod joints;
 mod left;
 mod logs;
 mod made;
 mod missing;
 mod next;
+mod overview;
 mod trust;
 
 use maud::Markup;
 
 use super::json::PLOTS;
+use super::overview::{is_large, sentence};
 use super::page;
 use super::schema::{ParameterEntry, Report};
 use super::wording::{amount, capitalised};
@@ -66,6 +69,12 @@ pub(super) enum Block {
         is_open: bool,
         blocks: Vec<Block>,
     },
+    /// A part that others point to by its identifier.
+    Part {
+        id: String,
+        about: String,
+        blocks: Vec<Block>,
+    },
     /// Ready for a page; a text shows files of the report's folder instead.
     Drawn {
         page: Markup,
@@ -90,6 +99,8 @@ pub(super) struct Cell {
     pub hint: Option<String>,
     /// A share that a page shows as a bar.
     pub bar: Option<f64>,
+    /// The part of the page with more about it.
+    pub part: Option<String>,
 }
 
 pub(super) fn document(report: &Report) -> Document {
@@ -102,18 +113,25 @@ pub(super) fn document(report: &Report) -> Document {
         question,
         answer,
     };
+    let missing = match is_large(report.joints) {
+        true => overview::answer(report),
+        false => missing::answer(report),
+    };
+    let joints =
+        is_large(report.joints).then(|| section("joints", "Joint by joint", joints::parts(report)));
+    let first = [section("missing", "What is missing?", missing)];
+    let rest = [
+        section("better", "How much better is it?", better::answer(report)),
+        section("trust", "Can I trust it?", trust::answer(report)),
+        section("show", "Show me", vec![pictures]),
+        section("next", "What next?", vec![next::steps(report)]),
+        made::section(report),
+    ];
     Document {
         about: report.system.clone(),
         headline: report.headline.clone(),
         head: head(report),
-        sections: vec![
-            section("missing", "What is missing?", missing::answer(report)),
-            section("better", "How much better is it?", better::answer(report)),
-            section("trust", "Can I trust it?", trust::answer(report)),
-            section("show", "Show me", vec![pictures]),
-            section("next", "What next?", vec![next::steps(report)]),
-            made::section(report),
-        ],
+        sections: first.into_iter().chain(joints).chain(rest).collect(),
     }
 }
 
@@ -125,8 +143,31 @@ fn head(report: &Report) -> Vec<Block> {
         let about = one.about(report.audit.len());
         Block::Serious(format!("**{about}**, to be fixed first: {}", one.text))
     });
-    let reason = paragraph(format!("{}.", capitalised(&report.reason)));
-    serious.chain([reason]).collect()
+    serious.chain(reason(report)).collect()
+}
+
+fn reason(report: &Report) -> Vec<Block> {
+    let sentence_of = |text: &str| format!("{}.", capitalised(text));
+    if !is_large(report.joints) {
+        return vec![paragraph(sentence_of(&report.reason))];
+    }
+    let (first, more) = reasons(report);
+    let more = (!more.is_empty()).then(|| {
+        let list = more.iter().map(|text| format!("{text}.")).collect();
+        folded("More about the verdict", vec![Block::List(list)])
+    });
+    let first = [
+        sentence_of(first),
+        sentence(report, 0..report.error.horizons_s.len()),
+    ]
+    .map(paragraph);
+    first.into_iter().chain(more).collect()
+}
+
+/// The reason for the verdict: what it says first, and the rest. A search over many joints has much to add.
+pub(super) fn reasons(report: &Report) -> (&str, Vec<&str>) {
+    let mut clauses = report.reason.split("; ");
+    (clauses.next().unwrap_or_default(), clauses.collect())
 }
 
 fn heading(text: &str) -> Block {
@@ -146,6 +187,14 @@ fn folded(about: impl Into<String>, blocks: Vec<Block>) -> Block {
         about: about.into(),
         is_open: false,
         blocks,
+    }
+}
+
+/// What is too long for the page of a rig of many joints, folded away there.
+fn folded_if_large(report: &Report, about: &str, blocks: Vec<Block>) -> Vec<Block> {
+    match is_large(report.joints) {
+        true => vec![folded(about, blocks)],
+        false => blocks,
     }
 }
 
@@ -178,7 +227,7 @@ fn value(parameter: &ParameterEntry) -> String {
     format!("`{}` = {}", parameter.name, amount(parameter))
 }
 
-pub(super) fn values(parameters: &[ParameterEntry]) -> String {
-    let values: Vec<String> = parameters.iter().map(value).collect();
+pub(super) fn values<'p>(parameters: impl IntoIterator<Item = &'p ParameterEntry>) -> String {
+    let values: Vec<String> = parameters.into_iter().map(value).collect();
     values.join(", ")
 }

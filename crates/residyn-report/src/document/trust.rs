@@ -4,7 +4,7 @@ use super::bodies::bodies;
 use super::calibration::calibration;
 use super::left::left;
 use super::logs::by_log;
-use super::{Block, Cell, better, cell, cells, folded, heading, paragraph, table};
+use super::{Block, Cell, better, cell, cells, folded, folded_if_large, heading, paragraph, table};
 use crate::schema::{
     AlternativeEntry, AuditEntry, ContradictedEntry, FitEntry, IdentifiabilityEntry, RefittedEntry,
     Report, TriedEntry,
@@ -39,7 +39,12 @@ fn alternatives(report: &Report) -> Vec<Block> {
         true => paragraph("None of the effects tried explains the logs as well."),
         false => Block::List(report.alternatives.iter().map(item).collect()),
     };
-    vec![heading("Other explanations"), rivals]
+    let about = format!(
+        "Effects that explain as much: {}",
+        report.alternatives.len()
+    );
+    let rivals = folded_if_large(report, &about, vec![rivals]);
+    [vec![heading("Other explanations")], rivals].concat()
 }
 
 /// The sets of effects that were fitted, round by round.
@@ -95,9 +100,12 @@ fn parameters(report: &Report) -> Vec<Block> {
     };
     let held = known.held.iter();
     let held = held.map(|name| format!("`{name}` is held: {}", why_held(known, name)));
-    let held = (!known.held.is_empty()).then(|| Block::List(held.collect()));
+    let held = (!known.held.is_empty()).then(|| {
+        let about = format!("Held at their declared values: {}", known.held.len());
+        folded_if_large(report, &about, vec![Block::List(held.collect())])
+    });
     let blocks = [heading("Parameters"), paragraph(about), values];
-    (blocks.into_iter().chain(held))
+    (blocks.into_iter().chain(held.into_iter().flatten()))
         .chain(bodies(report))
         .collect()
 }

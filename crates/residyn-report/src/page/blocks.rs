@@ -1,6 +1,6 @@
 //! The blocks of a document as HTML.
 
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
 
 use super::maths::formula;
 use crate::document::{Block, Cell, Table};
@@ -23,6 +23,7 @@ fn of(block: &Block) -> Markup {
             Block::Formula { latex, .. } => (formula(latex)),
             Block::Boxed(name, blocks) => div class=(name) { (shown(blocks)) },
             Block::Folded { about, is_open, blocks } => details open[*is_open] { summary { (about) } (shown(blocks)) },
+            Block::Part { id, about, blocks } => details.part { summary { (about) } div id=(id) { (shown(blocks)) } },
             Block::Drawn { page, .. } => (page),
         }
     }
@@ -31,17 +32,32 @@ fn of(block: &Block) -> Markup {
 fn table(table: &Table) -> Markup {
     html! {
         div.table tabindex="0" { table {
-            thead { tr { @for head in &table.heads { th { (marked(head)) } } } }
+            thead { tr { @for head in &table.heads { th { (breakable(head)) } } } }
             tbody {
                 @for row in &table.rows {
                     @let (names, values) = row.split_at(table.labels);
                     tr {
-                        @for name in names { th scope="row" class=[name.class] { (marked(&name.text)) } }
+                        @for name in names { (row_name(name)) }
                         @for value in values { (cell(value)) }
                     }
                 }
             }
         } }
+    }
+}
+
+fn row_name(
+    Cell {
+        text, class, part, ..
+    }: &Cell,
+) -> Markup {
+    html! {
+        th scope="row" class=[class] {
+            @match part {
+                Some(id) => a href={ "#" (id) } { (marked(text)) },
+                None => (marked(text)),
+            }
+        }
     }
 }
 
@@ -51,6 +67,7 @@ fn cell(
         class,
         hint,
         bar,
+        ..
     }: &Cell,
 ) -> Markup {
     html! {
@@ -68,6 +85,12 @@ fn cell(
 /// A length in CSS, at most the whole.
 pub(super) fn percent(share: f64) -> String {
     format!("{:.1}%", 100.0 * share.clamp(0.0, 1.0))
+}
+
+/// A head that may break after each part of a long name.
+fn breakable(head: &str) -> Markup {
+    let set = marked(head).into_string();
+    PreEscaped(set.replace('_', "_<wbr>"))
 }
 
 /// A text with its marks.

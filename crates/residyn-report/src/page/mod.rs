@@ -15,7 +15,7 @@ use super::document::{Document, document};
 use super::schema::Report;
 use blocks::shown;
 
-pub(super) use show::pictures;
+pub(super) use show::{pictures, pictures_of};
 
 /// The page of a report.
 pub fn page(report: &Report) -> String {

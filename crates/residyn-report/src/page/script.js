@@ -170,5 +170,12 @@
     waiting = setTimeout(redraw, 150);
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
-  matchMedia("print").addEventListener("change", redraw);
+  // Paper has a page for each joint.
+  const parts = [...document.querySelectorAll("details.part")];
+  let folded = [];
+  matchMedia("print").addEventListener("change", ({ matches }) => {
+    if (matches) folded = parts.filter((part) => !part.open);
+    for (const part of folded) part.open = matches;
+    redraw();
+  });
 })();

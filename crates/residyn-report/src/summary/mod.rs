@@ -1,14 +1,16 @@
-//! The answer for a terminal, in about thirty lines of eighty characters: the story of `report.html`, question by
+//! The answer for a terminal, in about thirty lines of eighty characters (of a hundred for a rig of many joints): the story of `report.html`, question by
 //! question. Sentences are wrapped and never cut; long lists show their first entries.
 
 mod better;
 mod curves;
+mod large;
 mod trust;
 
 use std::path::Path;
 
 use super::document::values;
 use super::json::PAGE;
+use super::overview::is_large;
 use super::schema::{EffectEntry, Report};
 use residyn_core::closeloop::Stage;
 use residyn_core::data::{Finding, Remedy, together};
@@ -53,6 +55,9 @@ pub fn summary(
     drawn: &[String],
     words: &Words<'_>,
 ) -> String {
+    if is_large(report.joints) {
+        return large::summary(report, seconds, folder, words);
+    }
     let mut lines = [head(report, words), missing(report), better::lines(report)].concat();
     let rest = [
         trust::lines(report),
@@ -69,19 +74,23 @@ pub fn summary(
 
 /// What is serious about the logs, then the answer.
 fn head(report: &Report, words: &Words<'_>) -> Vec<String> {
+    let serious = serious(report, words).map_or_else(Vec::new, |text| paragraph("", &text));
+    [serious, paragraph("", &answer(report))].concat()
+}
+
+/// The first of the findings that make results wrong.
+fn serious(report: &Report, words: &Words<'_>) -> Option<String> {
     let serious = report.serious();
     let said = |(log, finding): (&str, &Finding)| (log.to_owned(), finding.message(words.remedy));
     let serious = together(serious.map(said));
-    let first = serious.first().map(|first| {
+    serious.first().map(|first| {
         let more = match serious.len() - 1 {
             0 => String::new(),
             more => format!(" (and {more} more in report.md)"),
         };
         let about = first.about(report.audit.len());
         format!("Serious, to be fixed first{more}: {about}: {}", first.text)
-    });
-    let first = first.map_or_else(Vec::new, |text| paragraph("", &text));
-    [first, paragraph("", &answer(report))].concat()
+    })
 }
 
 /// The effects with their sizes; one line each if there are many.
@@ -107,10 +116,12 @@ fn missing(report: &Report) -> Vec<String> {
     [vec!["What is missing?".to_owned()], lines].concat()
 }
 
+const FIX_LOGS: &str = "fix the logs; `residyn audit` says how";
+
 /// What to do next.
 fn next(report: &Report, folder: &Path, words: &Words<'_>) -> String {
     let message = if report.serious().next().is_some() {
-        "fix the logs; `residyn audit` says how".to_owned()
+        FIX_LOGS.to_owned()
     } else if let Some(rival) = report.alternatives.first() {
         format!("to rule out {}: {}", rival.title, rival.experiment)
     } else {

@@ -27,6 +27,22 @@ pub(super) fn lines(report: &Report) -> Vec<String> {
         .collect()
 }
 
+/// The remarks on a rig of many joints: lists are counted, and what the table says is left out.
+pub(super) fn remarks_in_short(report: &Report) -> impl Iterator<Item = String> {
+    let count =
+        |count: usize, text: &str| (count > 0).then(|| format!("{text}: {count}, in report.md"));
+    let held = report.identifiability.held.len();
+    let remarks = [
+        at_bounds(report),
+        harmful(report),
+        calibrated(report),
+        count(report.alternatives.len(), "not ruled out"),
+        count(held, "held, since the logs do not determine them"),
+        proposal(report),
+    ];
+    remarks.into_iter().flatten()
+}
+
 /// Declared parameters that the fit moved to a bound of their range.
 fn at_bounds(report: &Report) -> Option<String> {
     let bound = report
