@@ -105,6 +105,9 @@ fn quadruped() -> Value {
 
 /// Errors of one joint become those of all.
 fn widen(model: &mut Value) {
+    if model.is_null() {
+        return;
+    }
     for kind in ["position_rmse", "position_median", "velocity_rmse"] {
         if let Some(horizons) = model[kind].as_array_mut() {
             for horizon in horizons {

@@ -32,7 +32,7 @@ pub(super) fn timing_not_carried(model: &ExportModel, mechanism: &Mechanism) -> 
     }
     if delays().any(|delay| delay < clock.step_s) {
         lost.push(format!(
-            "delays shorter than a step of {} s: MuJoCo delays by a step at least; give a shorter --step",
+            "delays shorter than a step of {} s: MuJoCo delays by a step at least; export with a shorter one",
             clock.step_s
         ));
     }
