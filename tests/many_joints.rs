@@ -120,7 +120,7 @@ fn widen(model: &mut Value) {
 /// A folder in which the pages were made from the quadruped's report.
 fn made() -> Scratch {
     let scratch = Scratch::new();
-    scratch.file("report.json", &quadruped().to_string());
+    scratch.file("report.json", quadruped().to_string());
     scratch.succeeds("report .");
     scratch
 }
@@ -240,7 +240,7 @@ fn a_difference_of_unknown_joints_is_refused() {
     let scratch = Scratch::new();
     let mut report = quadruped();
     report["differences"][0]["others"] = json!([13]);
-    scratch.file("report.json", &report.to_string());
+    scratch.file("report.json", report.to_string());
     let said = scratch.refuses("report .");
     assert!(said.contains("it has no joint 13"), "{said}");
 }

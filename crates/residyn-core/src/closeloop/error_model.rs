@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::data::Log;
+use super::problem::Problem;
+use crate::data::{Log, Quantity};
 use crate::identify::{Shooting, Window};
 use crate::model::{Dynamics, Effect, Entry, Model, ShowsIn};
 
@@ -17,14 +18,23 @@ pub enum ErrorModel {
     InverseDynamics,
 }
 
+impl Problem<'_> {
+    /// Whether its errors can show an effect.
+    pub(super) fn shows(&self, effect: &Effect) -> bool {
+        self.error_model.shows(effect, self.declared.driven_by())
+    }
+}
+
 impl ErrorModel {
     /// Whether these errors can show an effect. Torques are computed from the motion as it was read, and the torque
     /// that acts must determine the command: an effect that explains any command would always fit.
-    pub(super) fn shows(self, effect: &Effect) -> bool {
+    fn shows(self, effect: &Effect, driven_by: Quantity) -> bool {
         match self {
             Self::OutputError => effect.shows_in == ShowsIn::Any,
             Self::InverseDynamics => {
-                !matches!(effect.entry, Entry::Reading(_)) && effect.distinguishes_command()
+                !matches!(effect.entry, Entry::Reading(_))
+                    && effect.distinguishes_command()
+                    && (effect.shows_in != ShowsIn::LawTorques || driven_by == Quantity::Command)
             }
         }
     }

@@ -65,6 +65,8 @@ pub enum ShowsIn {
     Any,
     /// Of torques only: in an open-loop motion it is too much like something else.
     Torques,
+    /// Of torques that the law of a drive asks for.
+    LawTorques,
 }
 
 /// How an effect enters the equations of its joint. Formulas are in `q`, `qd`, `tau`, `load`, `t` of that joint and in

@@ -249,8 +249,11 @@ impl Word for ActsOn {
 }
 
 impl Word for ShowsIn {
-    const WORDS: &'static [(&'static str, Self)] =
-        &[("any", Self::Any), ("torques", Self::Torques)];
+    const WORDS: &'static [(&'static str, Self)] = &[
+        ("any", Self::Any),
+        ("torques", Self::Torques),
+        ("law torques", Self::LawTorques),
+    ];
 }
 
 impl Word for EachLog {

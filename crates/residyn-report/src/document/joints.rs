@@ -57,7 +57,7 @@ fn effects(report: &Report, joint: Joint) -> Vec<Block> {
     let cards: Vec<Block> = (report.effects.iter().filter(is_own))
         .map(|effect| missing::card(report, effect))
         .collect();
-    let cards = (!cards.is_empty()).then(|| Boxed("cards", cards));
+    let cards = (!cards.is_empty()).then_some(Boxed("cards", cards));
     let supported = report.supported.iter().filter(is_own);
     let supported = listed(
         Some("Supported, not established"),

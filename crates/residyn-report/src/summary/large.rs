@@ -229,9 +229,9 @@ fn value(held: &Held<'_>) -> String {
 /// A number with two digits.
 fn two_digits(x: f64) -> String {
     match x.abs() {
-        size if size >= 10.0 && size < 1e6 => format!("{x:.0}"),
-        size if size == 0.0 => "0".to_owned(),
-        size if size < 1e-4 || size >= 1e6 || size.is_nan() => format!("{x:.1e}"),
+        size if (10.0..1e6).contains(&size) => format!("{x:.0}"),
+        0.0 => "0".to_owned(),
+        size if !(1e-4..1e6).contains(&size) => format!("{x:.1e}"),
         size => {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // from 1 to 5
             let digits = (1.0 - size.log10().floor()).clamp(0.0, 6.0) as usize;

@@ -106,7 +106,7 @@ fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -
     let screen = |term: &Term| {
         let terms = [terms, &[*term]].concat();
         let effect = effect(&terms);
-        if !problem.error_model.shows(&effect) {
+        if !problem.shows(&effect) {
             return None;
         }
         let start = best_start(problem, model, &FittedEffect::absent(&effect, joint))?;

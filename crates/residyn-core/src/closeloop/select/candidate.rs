@@ -24,9 +24,7 @@ pub fn candidates(problem: &Problem<'_>, present: &[FittedEffect]) -> Vec<Fitted
 /// These effects on every joint where each can act and be observed.
 pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
-    let observable = effects
-        .iter()
-        .filter(|effect| problem.error_model.shows(effect));
+    let observable = effects.iter().filter(|effect| problem.shows(effect));
     for effect in observable {
         for joint in Joint::all(problem.declared.joints) {
             if is_driven_enough(problem, effect, joint)

@@ -2,6 +2,7 @@ use nalgebra::DMatrix;
 
 use super::equations::own_shares;
 use crate::closeloop::problem::Problem;
+use crate::data::Quantity;
 use crate::identify::{Fit, submatrix};
 use crate::model::Model;
 
@@ -18,7 +19,9 @@ pub struct Knowledge {
 
 impl Knowledge {
     pub fn of(problem: &Problem<'_>, model: &Model, fit: &Fit) -> Self {
-        let usual = |k: &usize| model.effects[*k].effect.baseline.is_some();
+        // A drive that closes a loop of its own is a geared motor, whose file is about the links.
+        let is_geared = problem.declared.driven_by() == Quantity::Command;
+        let usual = |k: &usize| is_geared && model.effects[*k].effect.baseline.is_some();
         let places: Vec<_> = (problem.added(model).filter(usual))
             .map(|k| model.place_of(k))
             .collect();
@@ -33,8 +36,8 @@ impl Knowledge {
     }
 
     /// Whether these values, after the first `base` of them, are distinguished from each other and from those. What only
-    /// the declared bodies distinguish from errors of theirs, as a rotor next to a link, is distinguished if most
-    /// machines have it: anything else would be an error of the bodies under another name.
+    /// the declared bodies distinguish from errors of theirs, as a rotor next to a link, is distinguished on a rig that
+    /// commands drive if most machines have it: anything else would be an error of the bodies under another name.
     pub fn distinguishes(&self, columns: &[usize], base: usize) -> bool {
         let shares = |of: &DMatrix<f64>| own_shares(&submatrix(of, columns, columns), base);
         let (Some(logs), Some(all)) = (shares(&self.logs), shares(&self.all)) else {
