@@ -179,7 +179,7 @@ fn a_lag_has_the_same_derivative() {
 /// An effect on the servo, the integrator, and what its file says that MuJoCo does otherwise.
 const TIMING: &str = "
 actuator_delay@1: d = 0.025 | rk4   | commands that jump within a step
-actuator_delay@1: d = 0.005 | euler | delays shorter than a step of 0.01 s ... give a shorter --step
+actuator_delay@1: d = 0.005 | euler | delays shorter than a step of 0.01 s ... export with a shorter one
 actuator_lag@1: T = 0.05    | euler | the lag within a step
 ";
 
