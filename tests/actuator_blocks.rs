@@ -8,7 +8,7 @@ use residyn_formats::{ExportModel, Format, find};
 use serde_json::json;
 
 use crate::support::says;
-use crate::support::tables::rows;
+use crate::support::tables::effects;
 
 /// What the joints of the servo arm have beyond its description: effect, joint, values.
 const EFFECTS: &str = "
@@ -24,12 +24,8 @@ sensor_offset       | 3 | q_z = 0.02
 ";
 
 /// The servo arm with these effects, in steps of 5 ms.
-fn arm(effects: &str) -> ExportModel {
-    let effect = |[name, joint, values]: [String; 3]| {
-        format!("\n[[effect]]\nname = \"{name}\"\njoint = {joint}\n{values}\n")
-    };
-    let effects: String = rows(effects).into_iter().map(effect).collect();
-    let text = include_str!("fixtures/servo_arm.toml").to_owned() + &effects;
+fn arm(beyond: &str) -> ExportModel {
+    let text = include_str!("fixtures/servo_arm.toml").to_owned() + &effects(beyond);
     let model = Model::from_text(Path::new("arm"), &text, Library::built_in().effects()).unwrap();
     ExportModel::of_system(&model, Integrator::RK4, 0.005, json!({}))
 }

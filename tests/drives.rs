@@ -13,7 +13,7 @@ use serde_json::Value;
 use crate::support::catalogue::{assert_near, points};
 use crate::support::clients::client;
 use crate::support::reports::estimate;
-use crate::support::tables::{rows, says_words};
+use crate::support::tables::{effects, rows, says_words};
 use crate::support::{Scratch, mechanisms, says};
 
 /// A limb of two links and its joints: their names, where it hangs, and what the joints have beyond the drawing.
@@ -488,11 +488,7 @@ constant_torque  | 3 | tau_0 = 0.4
 
     /// What the model says of a rig and what MuJoCo makes of its file are the same motion.
     fn moves_alike(scratch: &Scratch, declared: &str, joints: usize) {
-        let effect = |[name, joint, values]: [String; 3]| {
-            format!("\n[[effect]]\nname = \"{name}\"\njoint = {joint}\n{values}\n")
-        };
-        let effects: String = rows(BEYOND).into_iter().map(effect).collect();
-        scratch.file("rig.toml", declared.to_owned() + &effects);
+        scratch.file("rig.toml", declared.to_owned() + &effects(BEYOND));
         let [amplitude, start] = [vec![0.5; joints], vec![0.0; 2 * joints]];
         let plant = format!(
             "model = \"rig.toml\"\nsensor = {{ rate_hz = 200, position_noise = 0, position_step = 0 }}\n\

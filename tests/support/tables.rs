@@ -20,3 +20,12 @@ pub fn rows<const CELLS: usize>(table: &str) -> Vec<[String; CELLS]> {
 pub fn says_words(message: &str, words: &str) {
     says(message, &words.split(" ... ").collect::<Vec<_>>());
 }
+
+/// A table of effects, their joints and their values, as it stands in a model file.
+#[track_caller]
+pub fn effects(table: &str) -> String {
+    let effect = |[name, joint, values]: [String; 3]| {
+        format!("\n[[effect]]\nname = \"{name}\"\njoint = {joint}\n{values}\n")
+    };
+    rows(table).into_iter().map(effect).collect()
+}

@@ -41,10 +41,9 @@ impl Unused {
     }
 }
 
-/// The model without one of the chosen effects, the model with the usual friction, with the effects that most machines
-/// have, or the declared one, if it predicts
-/// whole logs better than the chosen one: those left out of a fit of the others in turn, and those set `apart`, to which
-/// nothing is fitted. The search compares short windows of logs that it knows.
+/// The model without one of the chosen effects, with the usual friction, with the effects that most machines have, or the
+/// declared one, if it predicts whole logs better than the chosen one: those left out of a fit of the others in turn, and
+/// those set `apart`, to which nothing is fitted. The search compares short windows of logs that it knows.
 pub(super) fn plainer(
     problem: &Problem<'_>,
     declared: &Fitted,
@@ -66,25 +65,27 @@ pub(super) fn plainer(
     }
     let settings = &problem.settings.select;
     let least = LeftOut::of(problem, after, apart);
+    let differs = |other: &&Fitted| !has_same_effects(other, after);
     let friction = problem.with_usual_friction();
-    let friction = friction.filter(|friction| !has_same_effects(friction, after));
-    let usual = chosen.usual.as_ref();
-    let usual = usual.filter(|usual| !has_same_effects(usual, after));
+    let friction = friction.as_ref().filter(differs);
+    let usual = chosen.usual.as_ref().filter(differs);
     let whole = |fitted, of| Other {
         fitted,
         unused: None,
         of,
         least: settings.plainer_gain,
     };
-    let others = (friction.iter())
-        .map(|friction| whole(friction, "of the model with the usual friction"))
-        .chain(usual.map(|usual| {
-            whole(
-                usual,
-                "of the model with the effects that most machines have",
-            )
-        }))
-        .chain([whole(declared, "of the declared model")]);
+    let others = [
+        (friction, "of the model with the usual friction"),
+        (
+            usual,
+            "of the model with the effects that most machines have",
+        ),
+        (Some(declared), "of the declared model"),
+    ];
+    let others = others
+        .into_iter()
+        .filter_map(|(other, of)| Some(whole(other?, of)));
     // The zeros of sensors are unknown in logs that a fit has not seen.
     let of_rig =
         (chosen.standings.iter()).filter(|standing| !standing.effect.effect.is_of_sensor());

@@ -26,15 +26,8 @@ const IMPORTS: &str = "from isaaclab.actuators import DelayedPDActuatorCfg, Impl
 
 fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
     let own = Blocks::of(model).map_err(|reason| model.refused("Isaac Lab actuators", reason))?;
-    let mut text = own.head(model, ABOUT, IMPORTS) + "ACTUATORS = {\n";
-    for block in &own.blocks {
-        text += &written(block);
-    }
-    Ok(vec![File::new(
-        path,
-        text + "}\n",
-        "ACTUATORS, one a joint",
-    )])
+    let head = own.head(model, ABOUT, IMPORTS);
+    Ok(own.file(path, head, ["{", "}"], written))
 }
 
 /// A joint whose commands are late is driven by Isaac Lab, which can delay them, the others by the physics engine.

@@ -5,9 +5,10 @@ pub(super) mod isaaclab;
 pub(super) mod mjlab;
 
 use std::fmt::Write;
+use std::path::Path;
 
-use super::ExportModel;
 use super::robot::powertrain::{PositionLoop, Powertrain, Powertrains};
+use super::{ExportModel, File};
 use residyn_core::data::Joint;
 use residyn_core::model::tree::rounded;
 
@@ -87,6 +88,19 @@ impl Blocks {
             number(model.step_s)
         );
         text
+    }
+
+    /// The one file: its head, and each block as `written` between these brackets.
+    fn file(
+        &self,
+        path: &Path,
+        head: String,
+        [open, close]: [&str; 2],
+        written: fn(&Block) -> String,
+    ) -> Vec<File> {
+        let blocks: String = self.blocks.iter().map(written).collect();
+        let text = format!("{head}ACTUATORS = {open}\n{blocks}{close}\n");
+        vec![File::new(path, text, "ACTUATORS, one a joint")]
     }
 }
 

@@ -1,3 +1,5 @@
+//! Which effects a fit distinguishes from the rest of its model.
+
 use nalgebra::DMatrix;
 
 use super::equations::own_shares;
@@ -8,9 +10,10 @@ use crate::model::Model;
 
 /// What is known of a fit's values, and how much of it an effect needs for its own.
 pub struct Knowledge {
-    /// Information of the logs alone, then with that of the bodies' declaration.
+    /// Information of the logs alone.
     logs: DMatrix<f64>,
-    all: DMatrix<f64>,
+    /// The same with that of the bodies' declaration, if it counts for some value.
+    all: Option<DMatrix<f64>>,
     /// Which values belong to effects that most machines have.
     usual: Vec<bool>,
     /// The share of the information on an effect that must be independent of the rest.
@@ -27,10 +30,11 @@ impl Knowledge {
             .collect();
         let is_usual = |parameter| places.iter().any(|place| place.contains(&parameter));
         let columns = fit.columns.iter();
+        let usual: Vec<bool> = columns.map(|column| is_usual(column.parameter)).collect();
         Self {
             logs: fit.equations().hessian,
-            all: fit.information(),
-            usual: columns.map(|column| is_usual(column.parameter)).collect(),
+            all: usual.contains(&true).then(|| fit.information()),
+            usual,
             least: problem.settings.select.own_information,
         }
     }
@@ -39,14 +43,14 @@ impl Knowledge {
     /// the declared bodies distinguish from errors of theirs, as a rotor next to a link, is distinguished on a rig that
     /// commands drive if most machines have it: anything else would be an error of the bodies under another name.
     pub fn distinguishes(&self, columns: &[usize], base: usize) -> bool {
-        let shares = |of: &DMatrix<f64>| own_shares(&submatrix(of, columns, columns), base);
-        let (Some(logs), Some(all)) = (shares(&self.logs), shares(&self.all)) else {
-            return false;
+        let own = &columns[base..];
+        let suffices = |of: &DMatrix<f64>, for_usual: bool| {
+            let shares = own_shares(&submatrix(of, columns, columns), base);
+            shares.is_some_and(|shares| {
+                let mut own = own.iter().zip(shares);
+                own.all(|(i, share)| self.usual[*i] != for_usual || share > self.least)
+            })
         };
-        let own = columns[base..].iter().zip(logs.iter().zip(&all));
-        own.into_iter().all(|(i, (logs, all))| {
-            let share = if self.usual[*i] { all } else { logs };
-            *share > self.least
-        })
+        suffices(&self.logs, false) && self.all.as_ref().is_none_or(|all| suffices(all, true))
     }
 }
