@@ -48,7 +48,7 @@ fn fitted(
             values.push(value);
             own.extend(of_logs);
         } else {
-            values.push(estimate(section.read(&parameter.name)?));
+            values.push(estimate(&section.read(&parameter.name)?));
         }
     }
     Ok(FittedEffect {
@@ -76,10 +76,12 @@ fn pair(section: &Section<'_>, joints: usize) -> Result<Joint, FileError> {
 }
 
 /// `F_c = 0.16` or `F_c = { value = 0.16, ci95 = [0.15, 0.17] }`.
-fn estimate(given: OrTable<f64, ValueTable<'_>>) -> Estimate {
+fn estimate(given: &OrTable<f64, ValueTable<'_>>) -> Estimate {
     match given {
-        OrTable::Plain(value) => (value, None),
-        OrTable::Table(ValueTable { value, ci95, .. }) => (value, ci95.map(|Limits(ends)| ends)),
+        OrTable::Plain(value) => (*value, None),
+        OrTable::Table(ValueTable { value, ci95, .. }) => {
+            (*value, ci95.as_ref().map(|Limits(ends)| *ends))
+        }
     }
 }
 
@@ -90,16 +92,19 @@ fn per_log(given: OrTable<f64, PerLogTable<'_>>, k: usize) -> (Estimate, Vec<Per
         OrTable::Plain(value) => return ((value, None), Vec::new()),
         OrTable::Table(table) => table,
     };
-    let own = |(log, given)| {
-        let (value, ci95) = estimate(given);
-        PerLogValue {
-            log,
-            parameter: k,
-            value,
-            ci95,
-        }
-    };
-    let Named(logs) = table.logs;
+    let Named(logs) = &table.logs;
+    let own = logs.iter().map(|(log, given)| of_one_log(log, given, k));
     let value = (table.value, table.ci95.map(|Limits(ends)| ends));
-    (value, logs.into_iter().map(own).collect())
+    (value, own.collect())
+}
+
+/// The value of the `k`-th parameter in a log: `"run1.csv" = { value = 0.012, ci95 = [0.011, 0.013] }`.
+pub(super) fn of_one_log(log: &str, given: &OrTable<f64, ValueTable<'_>>, k: usize) -> PerLogValue {
+    let (value, ci95) = estimate(given);
+    PerLogValue {
+        log: log.to_owned(),
+        parameter: k,
+        value,
+        ci95,
+    }
 }
