@@ -16,6 +16,7 @@ mod bad_values;
 mod bench;
 mod bench_rigs;
 mod check;
+mod configurations;
 mod control;
 mod demo;
 mod dependencies;

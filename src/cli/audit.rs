@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{Answer, Common, inputs, remedy, terminal};
 use residyn_core::data::{Audit, Columns, Log, Severity, audit_together, report_repeats};
-use residyn_core::model::Library;
+use residyn_core::model::{Library, Model};
 use residyn_io::{
     logs_in, read_log, read_log_from, read_model, read_standard_log, read_standard_log_from,
 };
@@ -29,8 +29,17 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let (logs, columns) = terminal::stage("reading the logs", || read(arguments))?;
+    let model = (arguments.model.as_ref())
+        .map(|model| read_model(model, &Library::built_in()))
+        .transpose()?;
+    let logs = terminal::stage("reading the logs", || read(arguments, model.as_ref()))?;
+    let columns = (model.as_ref()).map_or_else(Columns::default, |model| model.columns.clone());
     inputs::print_notes(&logs);
+    for pattern in model.iter().flat_map(|model| model.unmatched(&logs)) {
+        terminal::say(format!(
+            "note: [logs.{pattern:?}] of the model matches none of these logs"
+        ));
+    }
     let mut audits = audit_together(&logs, &columns);
     report_repeats(&logs, &mut audits);
     if arguments.common.json {
@@ -57,23 +66,22 @@ fn headline(audit: &Audit) -> String {
     format!("{}: {serious} serious, {warnings} warning(s)", audit.log)
 }
 
-/// The logs and what their columns are.
-fn read(arguments: &Arguments) -> Result<(Vec<Log>, Columns)> {
+/// The logs, read with the model's columns or else with the standard ones.
+fn read(arguments: &Arguments, model: Option<&Model>) -> Result<Vec<Log>> {
     let paths = logs_in(&arguments.logs)?;
     let logs = paths.iter();
-    let Some(model) = &arguments.model else {
+    let Some(model) = model else {
         let logs = logs.map(|path| match is_standard_input(path) {
             true => read_standard_log_from(stdin().lock(), "-"),
             false => read_standard_log(path),
         });
-        return Ok((logs.collect::<Result<_, _>>()?, Columns::default()));
+        return Ok(logs.collect::<Result<_, _>>()?);
     };
-    let model = read_model(model, &Library::built_in())?;
     let logs = logs.map(|path| match is_standard_input(path) {
-        true => read_log_from(stdin().lock(), "-", &model),
-        false => read_log(path, &model),
+        true => read_log_from(stdin().lock(), "-", model),
+        false => read_log(path, model),
     });
-    Ok((logs.collect::<Result<_, _>>()?, model.columns))
+    Ok(logs.collect::<Result<_, _>>()?)
 }
 
 fn is_standard_input(path: &Path) -> bool {

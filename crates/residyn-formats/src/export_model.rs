@@ -241,7 +241,20 @@ impl ExportModel {
             let Parameter { name, value, .. } = p;
             format!("per-log values of {name}: {value} is written for all logs")
         });
-        shown.into_iter().chain(own).collect()
+        let differs = |k: &usize| {
+            let mut given = self
+                .equations
+                .configurations
+                .iter()
+                .flat_map(|table| &table.given);
+            given.any(|(parameter, _)| parameter == k)
+        };
+        let parameters = self.equations.parameters.iter().enumerate();
+        let given = parameters.filter(|(k, _)| differs(k)).map(|(_, p)| {
+            let Parameter { name, value, .. } = p;
+            format!("values of {name} in [logs]: {value} is written for all logs")
+        });
+        shown.into_iter().chain(own).chain(given).collect()
     }
 
     /// The parameter that is the time constant (s) of a joint's delay or lag, if it has one.

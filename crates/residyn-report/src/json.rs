@@ -236,17 +236,34 @@ fn norms(
     }
 }
 
-/// The parameters of the declared equations; those of `model` include the shifts.
+/// The parameters of the declared equations, or their values in single logs; those of `model` include the shifts.
 fn refitted(outcome: &Outcome, model: &Model) -> Vec<RefittedEntry> {
     let before = &outcome.models.before.model.parameters;
     let declared = &outcome.given.declared;
-    let entry = |((after, before), declared): ((&Parameter, &Parameter), &f64)| RefittedEntry {
-        fitted: parameter(after),
-        declared: *declared,
-        before: before.value,
+    let entry = |(k, ((after, before), declared)): (usize, ((&Parameter, &Parameter), &f64))| {
+        let entry = |fitted| RefittedEntry {
+            fitted,
+            declared: *declared,
+            before: before.value,
+        };
+        let own: Vec<&PerLogValue> = (model.own.iter())
+            .filter(|own| own.parameter == k)
+            .collect();
+        let in_log = |own: &PerLogValue| {
+            let parameter = Parameter {
+                value: own.value,
+                ci95: own.ci95,
+                ..after.clone()
+            };
+            entry(row(&(parameter, Some(own))))
+        };
+        match own.is_empty() {
+            true => vec![entry(parameter(after))],
+            false => own.into_iter().map(in_log).collect(),
+        }
     };
     let all = model.parameters.iter().zip(before).zip(declared);
-    all.map(entry).collect()
+    all.enumerate().flat_map(entry).collect()
 }
 
 fn ended(fit: &Fit) -> FitEntry {

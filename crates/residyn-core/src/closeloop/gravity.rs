@@ -58,7 +58,7 @@ pub(super) fn shares_of_gravity(problem: &Problem<'_>) -> Vec<Option<f64>> {
     }
     let bodies = problem.declared.without_drive().with_effects(Vec::new());
     let of_log = |log| {
-        let smooth = problem.declared.with_drive_torques(Smooth::of(log));
+        let smooth = problem.declared.with_drive_torques(log, Smooth::of(log));
         share(&bodies, &smooth, &problem.settings.notes)
     };
     problem.logs.iter().map(of_log).collect()

@@ -20,7 +20,7 @@ use super::select::{Rival, Round, Tried};
 use super::stage::Watch;
 use crate::data::{Audit, Joint, Log};
 use crate::identify::{FitError, as_it_stands};
-use crate::model::{FittedEffect, Model};
+use crate::model::{FittedEffect, Model, PerLogValue};
 
 /// As [`find`], limb by limb; `None` if there is only one limb, or motion is compared, in which all joints are one part.
 pub(super) fn find_in_limbs<'a>(
@@ -109,6 +109,9 @@ impl Limb {
                 own.clone_from(found);
             }
         }
+        let of_limb = |own: &&PerLogValue| !self.model.parameters[own.parameter].fixed;
+        whole.own.retain(|own| !of_limb(&own));
+        whole.own.extend(limb.own.iter().filter(of_limb).cloned());
         let mut effects = limb.effects.iter().map(|effect| self.of_whole(effect));
         let declared = whole.effects.iter_mut();
         let declared = declared.filter(|effect| self.joints.contains(&effect.joint));

@@ -12,6 +12,7 @@ use super::problem::Problem;
 use super::refine::Refined;
 use super::select::is_of_too_many;
 use crate::data::{Audit, Finding, Repeated, Severity, report_repeats};
+use crate::model::Model;
 
 /// What fitted models say of the logs.
 pub(super) struct Noted {
@@ -58,6 +59,7 @@ pub(super) fn noted(
         report_external_forces(&tested, &forces, &mut of_test);
     }
     let mut audits = [of_train, of_test].concat();
+    report_unmatched(problem.declared, prepared, &mut audits);
     let fitted_tests = report_fitted_tests(prepared, &mut audits);
     Noted {
         audits,
@@ -74,6 +76,19 @@ fn report_fitted_tests(prepared: &Prepared<'_>, audits: &mut [Audit]) -> Vec<Str
     let is_fitted = |repeated: &Repeated| repeated.is_identical() && repeated.place < train.len();
     let fitted = of_test.filter(|(_, repeated)| repeated.as_ref().is_some_and(is_fitted));
     fitted.map(|(log, _)| log.name()).collect()
+}
+
+/// Report in the first log's audit which tables of the model file speak of none of the logs.
+fn report_unmatched(declared: &Model, prepared: &Prepared<'_>, audits: &mut [Audit]) {
+    let logs = (prepared.train.logs.iter()).chain(&*prepared.test.logs);
+    for pattern in declared.unmatched(logs) {
+        let text = format!(
+            "[logs.{pattern:?}] of the model file matches none of the logs: it is compared with their file names"
+        );
+        if let Some(audit) = audits.first_mut() {
+            audit.add(Finding::new(Severity::Warning, text));
+        }
+    }
 }
 
 /// Report in the first log's audit which effects are not looked for because there are too many logs.

@@ -198,7 +198,10 @@ fn left_in_turn(problem: &Problem<'_>, fitted: &Fitted) -> Option<Vec<f64>> {
     let groups = GROUPS.min(problem.logs.len());
     let effects = &fitted.model.effects;
     let of_one_log = effects.iter().flat_map(|effect| &effect.effect.parameters);
-    if groups < 2 || of_one_log.clone().any(|parameter| parameter.per_log) {
+    let mut declared = fitted.model.parameters.iter();
+    let is_of_one_log = of_one_log.clone().any(|parameter| parameter.per_log)
+        || declared.any(|parameter| parameter.per_log && !parameter.per_group);
+    if groups < 2 || is_of_one_log {
         return None;
     }
     let of_group = |group: usize| -> Vec<f64> {

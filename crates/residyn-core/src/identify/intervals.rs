@@ -60,7 +60,7 @@ pub fn blocks_of_times(windows: impl Iterator<Item = (usize, f64)>, length_s: f6
 pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     let blocks = blocks(shooting);
     let size = fit.columns.len();
-    let blocks_of = blocks_of(shooting, fit, &blocks);
+    let blocks_of = blocks_of(fit, &blocks);
     // Bodies are declared within a spread, whose variance is added below.
     let all = fit.information();
     let mut parts = fit.equations_by(&blocks);
@@ -106,17 +106,18 @@ fn excess(fit: &Fit, covariance: &DMatrix<f64>) -> f64 {
     (2.0 * fit.bodies.cost / message.max(1.0)).max(1.0)
 }
 
-fn blocks_of(shooting: &Shooting<'_>, fit: &Fit, blocks: &[usize]) -> Vec<usize> {
-    let count = |log: Option<usize>| {
-        let windows = shooting.windows.iter().zip(blocks);
+/// In how many of the windows' blocks each column enters.
+fn blocks_of(fit: &Fit, blocks: &[usize]) -> Vec<usize> {
+    let count = |column: usize| {
+        let windows = fit.reduced.iter().zip(blocks);
         let mut dependent: Vec<usize> = windows
-            .filter(|(window, _)| log.is_none_or(|log| window.log == log))
+            .filter(|(window, _)| window.columns.contains(&column))
             .map(|(_, block)| *block)
             .collect();
         dependent.dedup();
         dependent.len()
     };
-    fit.columns.iter().map(|column| count(column.log)).collect()
+    (0..fit.columns.len()).map(count).collect()
 }
 
 /// Directions with less than this share of the largest eigenvalue are flat: their information is rounding error.

@@ -26,6 +26,13 @@ impl WindowTerms {
             hessian: DMatrix::zeros(values, values),
         }
     }
+
+    /// Take a free value for one that the residuals do not depend on.
+    pub fn forget(&mut self, value: usize) {
+        self.gradient[value] = 0.0;
+        self.hessian.row_mut(value).fill(0.0);
+        self.hessian.column_mut(value).fill(0.0);
+    }
 }
 
 impl AddAssign<&Self> for WindowTerms {

@@ -136,6 +136,7 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
             bounds: [-1.0, 1.0],
             fixed: false,
             per_log: false,
+            per_group: false,
             ci95: None,
             scale: 0.01,
         });
@@ -159,6 +160,11 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         program: graph.finish(&outputs),
         filters: dynamics.filters.clone(),
         reading,
-        own: Vec::new(),
+        // The offsets replace what differs between single logs.
+        own: (dynamics.own.iter())
+            .filter(|own| dynamics.parameters[own.parameter].per_group)
+            .cloned()
+            .collect(),
+        configurations: dynamics.configurations.clone(),
     }
 }

@@ -65,13 +65,14 @@ impl<'a> Search<'a> {
         if shooting.windows.is_empty() {
             return Err(FitError::NoWindow);
         }
+        let values = Values::of(dynamics, shooting.logs);
         let mut search = Self {
             shooting,
             dynamics,
             tangent: Tangent::new(dynamics, active, shooting.local(&start_states)),
-            layout: Layout::new(&dynamics.parameters, active, &shooting.windows),
+            layout: Layout::new(&dynamics.parameters, active, &shooting.windows, &values),
             at: Point {
-                values: Values::of(dynamics, shooting.logs),
+                values,
                 start_states,
             },
             scale: scale.unwrap_or(1.0),

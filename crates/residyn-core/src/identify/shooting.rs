@@ -364,6 +364,11 @@ impl<'l> Shooting<'l> {
             |pack, data| pack.linearise(tangent, values, data, scale),
         );
         all.sort_by_key(|(window, _)| *window);
+        for (window, terms) in &mut all {
+            let given = values.given_in(self.windows[*window].log);
+            let is_given = |k: usize| tangent.active.iter().position(|active| *active == k);
+            given.filter_map(is_given).for_each(|k| terms.forget(k));
+        }
         all.into_iter().map(|(_, terms)| terms).collect()
     }
 }

@@ -1,7 +1,7 @@
 use nalgebra::DVector;
 
 use crate::data::Log;
-use crate::model::{Dynamics, Parameter, PerLogValue};
+use crate::model::{Dynamics, InLog, Parameter, PerLogValue};
 use crate::sim::Window;
 
 /// The value that a parameter has in one log only.
@@ -12,6 +12,15 @@ pub struct Own {
     /// Index into the model's parameters.
     pub parameter: usize,
     pub value: f64,
+    /// The first of the logs that share the value in a fit: the log itself unless the value is that of a group. `None`
+    /// if the model file gives the value, or holds it.
+    pub shared: Option<usize>,
+}
+
+impl Own {
+    fn is_of(&self, column: Column) -> bool {
+        self.shared.is_some() && self.shared == column.log && self.parameter == column.parameter
+    }
 }
 
 /// Values of all parameters of a model as a fit to a list of logs moves them: those that hold in every log, and those
@@ -27,12 +36,30 @@ pub struct Values {
 impl Values {
     /// The values of a model on these logs.
     pub fn of(dynamics: &Dynamics, logs: &[Log]) -> Self {
-        let in_log = |(index, log)| {
-            dynamics.values_in(log).map(move |own| Own {
+        let parameters = &dynamics.parameters;
+        let groups = dynamics.groups(logs);
+        let in_log = |(index, log): (usize, &Log)| {
+            let known: Vec<InLog> = dynamics.values_in(log).collect();
+            let is_known = |k: usize| known.iter().any(|known| known.parameter == k);
+            // A group shares a value from the start.
+            let new = parameters.iter().enumerate().map(|(parameter, p)| InLog {
+                parameter,
+                value: p.value,
+                is_given: p.fixed,
+            });
+            let new = new.filter(|new| parameters[new.parameter].per_group && !is_known(new.parameter));
+            let own = |found: &InLog| Own {
                 log: index,
-                parameter: own.parameter,
-                value: own.value,
-            })
+                parameter: found.parameter,
+                value: found.value,
+                shared: match &parameters[found.parameter] {
+                    p if found.is_given || p.fixed => None,
+                    p if p.per_group => Some(groups[index]),
+                    _ => Some(index),
+                },
+            };
+            let all: Vec<InLog> = known.iter().copied().chain(new).collect();
+            all.iter().map(own).collect::<Vec<_>>()
         };
         Self {
             common: dynamics.values(),
@@ -43,10 +70,13 @@ impl Values {
     /// The model with these values; values in other logs are kept.
     pub fn put_into(&self, dynamics: &Dynamics, logs: &[Log]) -> Dynamics {
         let mut found = dynamics.clone().with_values(self.common.iter().copied());
-        found
-            .own
-            .retain(|own| !logs.iter().any(|log| log.is_called(&own.log)));
-        found.own.extend(self.own.iter().map(|own| PerLogValue {
+        let is_fitted = |own: &PerLogValue| {
+            let is_given = dynamics.parameters[own.parameter].fixed;
+            !is_given && logs.iter().any(|log| log.is_called(&own.log))
+        };
+        found.own.retain(|own| !is_fitted(own));
+        let fitted = self.own.iter().filter(|own| own.shared.is_some());
+        found.own.extend(fitted.map(|own| PerLogValue {
             log: logs[own.log].path.display().to_string(),
             parameter: own.parameter,
             value: own.value,
@@ -75,8 +105,7 @@ impl Values {
 
     /// The value of a free value of a fit.
     pub fn get(&self, column: Column) -> f64 {
-        let is_it = |own: &&Own| Some(own.log) == column.log && own.parameter == column.parameter;
-        let own = self.own.iter().find(is_it);
+        let own = self.own.iter().find(|own| own.is_of(column));
         own.map_or(self.common[column.parameter], |own| own.value)
     }
 
@@ -100,16 +129,32 @@ impl Values {
             self.common[column.parameter] = value;
             return;
         };
-        let parameter = column.parameter;
-        let mut own = self.own.iter_mut();
-        match own.find(|own| own.log == log && own.parameter == parameter) {
-            Some(own) => own.value = value,
-            None => self.own.push(Own {
-                log,
-                parameter,
-                value,
-            }),
+        let mut is_new = true;
+        for own in self.own.iter_mut().filter(|own| own.is_of(column)) {
+            own.value = value;
+            is_new = false;
         }
+        if is_new {
+            self.own.push(Own {
+                log,
+                parameter: column.parameter,
+                value,
+                shared: Some(log),
+            });
+        }
+    }
+
+    /// The first of the logs that share a parameter's value in a log.
+    fn first_of(&self, parameter: usize, log: usize) -> usize {
+        let mut own = self.own.iter();
+        let own = own.find(|own| own.log == log && own.parameter == parameter);
+        own.and_then(|own| own.shared).unwrap_or(log)
+    }
+
+    /// Parameters whose values in a log the model file gives.
+    pub(super) fn given_in(&self, log: usize) -> impl Iterator<Item = usize> {
+        let given = move |own: &&Own| own.log == log && own.shared.is_none();
+        self.own.iter().filter(given).map(|own| own.parameter)
     }
 }
 
@@ -126,7 +171,7 @@ pub(crate) fn free_parameters(dynamics: &Dynamics) -> Vec<usize> {
 pub struct Column {
     /// Index into the model's parameters.
     pub parameter: usize,
-    /// The log in which it holds; `None` for all.
+    /// The log in which it holds, or the first one of the group in which it holds; `None` for all.
     pub log: Option<usize>,
 }
 
@@ -139,27 +184,33 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// One column for each active parameter or, if it differs by log, one for each log that has windows.
-    pub fn new(parameters: &[Parameter], active: &[usize], windows: &[Window]) -> Self {
+    /// One column for each active parameter or, if it differs by log, one for each log or group that has windows.
+    pub fn new(
+        parameters: &[Parameter],
+        active: &[usize],
+        windows: &[Window],
+        values: &Values,
+    ) -> Self {
         let mut logs: Vec<usize> = windows.iter().map(|window| window.log).collect();
         logs.sort_unstable();
         logs.dedup();
-        let mut columns = Vec::new();
+        let mut columns: Vec<Column> = Vec::new();
         let mut places = vec![Vec::new(); logs.last().map_or(0, |last| last + 1)];
         for &parameter in active {
             let per_log = parameters[parameter].per_log;
-            if !per_log {
-                columns.push(Column {
-                    parameter,
-                    log: None,
-                });
-            }
+            let first = columns.len();
             for &log in &logs {
-                if per_log {
-                    let log = Some(log);
-                    columns.push(Column { parameter, log });
+                let first_log = per_log.then(|| values.first_of(parameter, log));
+                let column = Column {
+                    parameter,
+                    log: first_log,
+                };
+                let known = columns[first..].iter().position(|known| *known == column);
+                let place = known.map_or(columns.len(), |place| first + place);
+                if known.is_none() {
+                    columns.push(column);
                 }
-                places[log].push(columns.len() - 1);
+                places[log].push(place);
             }
         }
         Self { columns, places }

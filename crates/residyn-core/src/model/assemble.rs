@@ -41,6 +41,7 @@ impl Model {
             filters: self.filters(),
             reading: None,
             own: self.per_log_values(),
+            configurations: self.configurations.clone(),
         }
     }
 
@@ -152,7 +153,8 @@ impl Model {
             });
             own.collect::<Vec<_>>()
         };
-        self.placed().flat_map(of_effect).collect()
+        let declared = self.own.iter().cloned();
+        declared.chain(self.placed().flat_map(of_effect)).collect()
     }
 }
 

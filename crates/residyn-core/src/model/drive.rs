@@ -94,31 +94,31 @@ impl Model {
         self.names_under(Quantity::Command)
     }
 
-    /// The drives' torques along a log (`[joint][row]`, N m or N), at the declared values, before any effect; the log's
+    /// The drives' torques along a log (`[joint][row]`, N m or N), at the declared values of that log, before any effect; the log's
     /// own torques if it holds torques.
     pub fn drive_torques(&self, log: &Log) -> Vec<Vec<f64>> {
         let channels = log.q.iter().chain(&log.qd).chain(&log.tau);
         let channels: Vec<&[f64]> = channels.chain([&log.time]).map(Vec::as_slice).collect();
-        self.drive_torques_along(&channels)
+        self.drive_torques_along(log, &channels)
     }
 
-    /// A smoothed log with the same torques in place of its commands.
-    pub fn with_drive_torques(&self, smooth: Smooth) -> Smooth {
+    /// The log, smoothed, with the same torques in place of its commands.
+    pub fn with_drive_torques(&self, log: &Log, smooth: Smooth) -> Smooth {
         let channels = smooth.q.iter().chain(&smooth.qd).chain(&smooth.tau);
         let channels = channels.chain([&smooth.time]).map(Vec::as_slice);
-        let tau = self.drive_torques_along(&channels.collect::<Vec<_>>());
+        let tau = self.drive_torques_along(log, &channels.collect::<Vec<_>>());
         Smooth { tau, ..smooth }
     }
 
-    /// The same along positions, velocities, commands and time.
-    fn drive_torques_along(&self, channels: &[&[f64]]) -> Vec<Vec<f64>> {
+    /// The same along positions, velocities, commands and time of a log.
+    fn drive_torques_along(&self, log: &Log, channels: &[&[f64]]) -> Vec<Vec<f64>> {
         let Some(program) = self.drive_program() else {
             let torques = &channels[2 * self.joints..3 * self.joints];
             return torques.iter().map(|torques| torques.to_vec()).collect();
         };
         let rows = channels.last().map_or(0, |time| time.len());
         let mut torques = vec![Vec::with_capacity(rows); self.joints];
-        let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
+        let values = self.declared_values_in(log);
         let mut tape = program.tape_at::<f64, 1>(channels.len(), &values);
         for row in 0..rows {
             for (slot, channel) in tape.moving().iter_mut().zip(channels) {

@@ -3,6 +3,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::configuration::{Configuration, Differing, InLog};
 use super::filter::Filter;
 use super::input_layout::InputLayout;
 use crate::data::{Joint, Log, Quantity};
@@ -22,6 +23,8 @@ pub struct Parameter {
     pub fixed: bool,
     /// Takes a separate value in each log.
     pub per_log: bool,
+    /// These values are the same in all logs of a group: those of which the same tables `[logs."pattern"]` speak.
+    pub per_group: bool,
     /// 95 % interval, once a fit has found one.
     pub ci95: Option<[f64; 2]>,
     /// Magnitude by which steps are scaled: that of the declared value, or 1 if it is zero; the typical one for
@@ -83,6 +86,8 @@ pub struct Dynamics {
     pub reading: Option<Program>,
     /// Values of parameters in single logs; `parameter` is an index into `parameters`.
     pub own: Vec<PerLogValue>,
+    /// Values of parameters that the model file gives for some logs.
+    pub configurations: Vec<Configuration>,
 }
 
 impl Dynamics {
@@ -109,15 +114,30 @@ impl Dynamics {
         in_log
     }
 
-    /// The values of parameters in one log, which is found by its path or else by its file name.
-    pub fn values_in<'a>(&'a self, log: &'a Log) -> impl Iterator<Item = &'a PerLogValue> {
-        let is_path = |own: &PerLogValue| log.path.as_os_str() == own.log.as_str();
-        let by_path = move |parameter: usize| {
-            let mut own = self.own.iter();
-            own.any(|own| own.parameter == parameter && is_path(own))
+    /// The values of parameters in one log, where they are not those of all logs.
+    pub fn values_in<'a>(&'a self, log: &'a Log) -> impl Iterator<Item = InLog> + 'a {
+        let all = match self.own.is_empty() && self.configurations.is_empty() {
+            true => &[],
+            false => self.parameters.as_slice(),
         };
-        let called = self.own.iter().filter(|own| log.is_called(&own.log));
-        called.filter(move |own| is_path(own) || !by_path(own.parameter))
+        let differing = self.differing();
+        let value = move |(k, p): (usize, &Parameter)| differing.value(k, p.per_group, log);
+        all.iter().enumerate().filter_map(value)
+    }
+
+    /// For each log the first one of its group, by their places in this list.
+    pub fn groups(&self, logs: &[Log]) -> Vec<usize> {
+        let group = |log: &Log| self.differing().group(&log.name());
+        let groups: Vec<Vec<bool>> = logs.iter().map(group).collect();
+        let first = |own| groups.iter().position(|group| group == own);
+        groups.iter().filter_map(first).collect()
+    }
+
+    fn differing(&self) -> Differing<'_> {
+        Differing {
+            configurations: &self.configurations,
+            own: &self.own,
+        }
     }
 
     /// What drives the model: torques or commands, as the names of the program's inputs say.

@@ -41,22 +41,26 @@ fn fitted(
     let mut known = vec!["name", key, "fixed", "status"];
     known.extend(effect.names());
     section.only(&known)?;
+    let fixed: bool = section.read("fixed")?;
     let (mut values, mut own) = (Vec::new(), Vec::new());
     for (k, parameter) in effect.parameters.iter().enumerate() {
-        if parameter.per_log {
-            let (value, of_logs) = per_log(section.read(&parameter.name)?, k);
-            values.push(value);
-            own.extend(of_logs);
-        } else {
-            values.push(estimate(section.read(&parameter.name)?));
+        let (value, of_logs) = per_log(section.read(&parameter.name)?, k);
+        if !(of_logs.is_empty() || parameter.per_log || fixed) {
+            let name = &parameter.name;
+            let message = format!(
+                "`{name}` has one value in all logs; values that you know for some of them need `fixed = true`"
+            );
+            return Err(section.error_at(name, message));
         }
+        values.push(value);
+        own.extend(of_logs);
     }
     Ok(FittedEffect {
         effect: effect.clone(),
         joint,
         values,
         own,
-        fixed: section.read("fixed")?,
+        fixed,
         status: section.read("status")?,
     })
 }
@@ -76,10 +80,12 @@ fn pair(section: &Section<'_>, joints: usize) -> Result<Joint, FileError> {
 }
 
 /// `F_c = 0.16` or `F_c = { value = 0.16, ci95 = [0.15, 0.17] }`.
-fn estimate(given: OrTable<f64, ValueTable<'_>>) -> Estimate {
+fn estimate(given: &OrTable<f64, ValueTable<'_>>) -> Estimate {
     match given {
-        OrTable::Plain(value) => (value, None),
-        OrTable::Table(ValueTable { value, ci95, .. }) => (value, ci95.map(|Limits(ends)| ends)),
+        OrTable::Plain(value) => (*value, None),
+        OrTable::Table(ValueTable { value, ci95, .. }) => {
+            (*value, ci95.as_ref().map(|Limits(ends)| *ends))
+        }
     }
 }
 
@@ -90,16 +96,19 @@ fn per_log(given: OrTable<f64, PerLogTable<'_>>, k: usize) -> (Estimate, Vec<Per
         OrTable::Plain(value) => return ((value, None), Vec::new()),
         OrTable::Table(table) => table,
     };
-    let own = |(log, given)| {
-        let (value, ci95) = estimate(given);
-        PerLogValue {
-            log,
-            parameter: k,
-            value,
-            ci95,
-        }
-    };
-    let Named(logs) = table.logs;
+    let Named(logs) = &table.logs;
+    let own = logs.iter().map(|(log, given)| of_one_log(log, given, k));
     let value = (table.value, table.ci95.map(|Limits(ends)| ends));
-    (value, logs.into_iter().map(own).collect())
+    (value, own.collect())
+}
+
+/// The value of the `k`-th parameter in a log: `"run1.csv" = { value = 0.012, ci95 = [0.011, 0.013] }`.
+pub(super) fn of_one_log(log: &str, given: &OrTable<f64, ValueTable<'_>>, k: usize) -> PerLogValue {
+    let (value, ci95) = estimate(given);
+    PerLogValue {
+        log: log.to_owned(),
+        parameter: k,
+        value,
+        ci95,
+    }
 }

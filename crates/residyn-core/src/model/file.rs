@@ -11,7 +11,7 @@ use super::input_layout::InputLayout;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Energy, Equations, Model, Motion, Places};
 use super::tables::{ChainTable, EnergyTable, ModelFile};
-use super::{effects_in_file, sections, tree_in_file};
+use super::{effects_in_file, logs_in_file, sections, tree_in_file};
 use crate::data::{Columns, Joint, Quantity};
 use crate::expr::{Formula, Graph, Scope, parse};
 
@@ -41,6 +41,8 @@ impl Model {
             parameters: parameters.map(|(_, table)| table.section.at).collect(),
             effects: file.effect.iter().map(|section| section.at).collect(),
         };
+        let own = logs_in_file::fitted(&file.parameters)?;
+        let parameters = sections::parameters(file.parameters)?;
         let model = Self {
             joints,
             smoothing_velocity: system.smoothing_velocity,
@@ -52,7 +54,9 @@ impl Model {
                 ..columns(file.columns, joints, driven_by, &system.joint_names)?
             },
             joint_names: system.joint_names,
-            parameters: sections::parameters(file.parameters)?,
+            configurations: logs_in_file::configurations(file.logs, &parameters)?,
+            own,
+            parameters,
             effects: effects_in_file::read(&file.effect, joints, library)?,
             hidden: sections::hidden(file.residual, joints)?,
             text: document.text.clone(),

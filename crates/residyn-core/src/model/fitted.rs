@@ -164,6 +164,7 @@ impl FittedEffect {
                 },
                 fixed: self.fixed || parameter.whole,
                 per_log: parameter.per_log,
+                per_group: false,
                 ci95: *ci95,
                 scale: parameter.typical,
             })

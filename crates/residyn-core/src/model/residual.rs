@@ -111,6 +111,7 @@ pub fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics {
         filters: Vec::new(),
         reading: None,
         own: Vec::new(),
+        configurations: Vec::new(),
     }
 }
 

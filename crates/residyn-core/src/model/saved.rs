@@ -141,6 +141,7 @@ impl SavedParameter {
             ],
             fixed: self.fixed,
             per_log: false,
+            per_group: false,
             ci95: None,
             scale: self.scale,
         }

@@ -8,7 +8,7 @@ use super::network::check_hidden;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::Motion;
 use super::tables::{ParameterTable, ResidualTable, SystemTable};
-use super::values::{Limits, Named};
+use super::values::{Limits, Named, Per};
 use super::{MlpSettings, Parameter};
 use crate::data::Joint;
 use crate::expr::Formula;
@@ -85,7 +85,8 @@ fn parameter((name, table): (String, ParameterTable<'_>)) -> Result<Parameter, F
         unit: table.unit.unwrap_or_default(),
         bounds: [low, high],
         fixed: table.fixed,
-        per_log: false,
+        per_log: table.per.is_some(),
+        per_group: matches!(table.per, Some(Per::Group)),
         ci95: table.ci95.map(|Limits(ends)| ends),
         scale: 1.0,
     };

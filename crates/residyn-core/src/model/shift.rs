@@ -19,9 +19,12 @@ impl Model {
     /// For each parameter that the file declares fixed, the effect that gives it another value: on the outermost joint
     /// whose equation it enters, still at zero.
     pub fn shifts(&self) -> Vec<FittedEffect> {
-        let fixed = |p: &&Parameter| p.fixed && p.unit != UNIT_OF_GRAVITY;
+        // A value that is known to differ between logs is not in doubt.
+        let fixed = |(k, p): &(usize, &Parameter)| {
+            p.fixed && p.unit != UNIT_OF_GRAVITY && !self.differs(*k)
+        };
         let all = self.parameters.iter().enumerate();
-        all.filter(|(_, p)| fixed(p))
+        all.filter(fixed)
             .filter_map(|(k, p)| {
                 let joint = self.outermost_joint(&p.name)?;
                 Some(FittedEffect::absent(&shift(k, p), joint))

@@ -3,6 +3,7 @@ use std::sync::Arc;
 
 use super::assemble::lower;
 use super::bodies::Bodies;
+use super::configuration::{Configuration, Differing};
 use super::drive::Drive;
 use super::dynamics::{Dynamics, Parameter, PerLogValue};
 use super::effect::{ActsOn, Effect, Entry, Measure};
@@ -10,6 +11,7 @@ use super::error::ModelError;
 use super::fitted::FittedEffect;
 use super::reader::Located;
 use super::tree::{Body, Recovered};
+use crate::data::statistics::mean;
 use crate::data::{Columns, Joint, Log, LogError, Quantity};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
@@ -65,6 +67,10 @@ pub struct Model {
     pub smoothing_velocity: Option<Vec<f64>>,
     pub columns: Columns,
     pub parameters: Vec<Parameter>,
+    /// Fitted values of declared parameters in single logs; in all other logs those of `parameters` hold.
+    pub own: Vec<PerLogValue>,
+    /// What the file says of some logs only, in its order: of several values for a log, the last one holds.
+    pub configurations: Vec<Configuration>,
     pub effects: Vec<FittedEffect>,
     /// Widths of the hidden layers of the residual MLP.
     pub hidden: Vec<usize>,
@@ -168,11 +174,46 @@ impl Model {
 
     /// The value of a parameter, by its index among all; with a log, its value there.
     pub fn value_of(&self, parameter: usize, log: Option<&Log>) -> f64 {
-        let in_log = |own: &PerLogValue| log.is_some_and(|log| log.is_called(&own.log));
-        let own = self.per_log_values().into_iter();
-        let mut own = own.filter(|own| own.parameter == parameter);
-        own.find(in_log)
-            .map_or_else(|| self.values()[parameter], |own| own.value)
+        let own = self.per_log_values();
+        let differing = Differing {
+            configurations: &self.configurations,
+            own: &own,
+        };
+        let of_group = self.parameters.get(parameter).is_some_and(|p| p.per_group);
+        let in_log = log.and_then(|log| differing.value(parameter, of_group, log));
+        in_log.map_or_else(|| self.values()[parameter], |found| found.value)
+    }
+
+    /// Values of the declared parameters in a log.
+    pub(super) fn declared_values_in(&self, log: &Log) -> Vec<f64> {
+        let differing = self.differing();
+        let value = |(k, p): (usize, &Parameter)| {
+            let in_log = differing.value(k, p.per_group, log);
+            in_log.map_or(p.value, |found| found.value)
+        };
+        self.parameters.iter().enumerate().map(value).collect()
+    }
+
+    /// How declared parameters differ between logs.
+    fn differing(&self) -> Differing<'_> {
+        Differing {
+            configurations: &self.configurations,
+            own: &self.own,
+        }
+    }
+
+    /// Whether a declared parameter has other values in some logs.
+    pub(super) fn differs(&self, parameter: usize) -> bool {
+        let mut given = self.configurations.iter().flat_map(|table| &table.given);
+        self.parameters[parameter].per_log || given.any(|(k, _)| *k == parameter)
+    }
+
+    /// The patterns of the tables `[logs."pattern"]` that match none of these logs.
+    pub fn unmatched<'l>(&self, logs: impl IntoIterator<Item = &'l Log>) -> Vec<&str> {
+        let names: Vec<String> = logs.into_iter().map(Log::name).collect();
+        let is_of_none = |table: &&Configuration| !names.iter().any(|name| table.is_of(name));
+        let unmatched = self.configurations.iter().filter(is_of_none);
+        unmatched.map(|table| table.pattern.as_str()).collect()
     }
 
     /// The same model with the values of its compiled form, per-log values included. Intervals are dropped, since they
@@ -191,6 +232,17 @@ impl Model {
         );
         for ((value, interval), parameter) in slots.into_iter().zip(&compiled.parameters) {
             (*value, *interval) = (parameter.value, None);
+        }
+        let declared = model.parameters.len();
+        let own = compiled.own.iter().filter(|own| own.parameter < declared);
+        model.own = own.cloned().collect();
+        for (k, parameter) in model.parameters.iter_mut().enumerate() {
+            let own = model.own.iter().filter(|own| own.parameter == k);
+            let values: Vec<f64> = own.map(|own| own.value).collect();
+            if parameter.per_log && !values.is_empty() {
+                // The best guess for a log that was not fitted.
+                parameter.value = mean(&values);
+            }
         }
         for k in 0..model.effects.len() {
             let place = self.place_of(k);
@@ -218,6 +270,19 @@ impl Model {
             *interval = around(*value);
             return;
         };
+        if let Some(declared) = self.parameters.get(parameter) {
+            let (of_group, before) = (declared.per_group, self.own.clone());
+            let differing = Differing {
+                configurations: &self.configurations,
+                own: &before,
+            };
+            for own in &mut self.own {
+                if own.parameter == parameter && differing.holds(own, of_group, log) {
+                    own.ci95 = around(own.value);
+                }
+            }
+            return;
+        }
         let Some(k) = (0..self.effects.len()).find(|k| self.place_of(*k).contains(&parameter))
         else {
             return;

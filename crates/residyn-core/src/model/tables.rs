@@ -1,15 +1,15 @@
 //! The tables of model, effect and drive files: which keys each has, and what they hold. A key that is not optional must
 //! be given; another one is refused.
 //!
-//! `[columns]`, `[drive]`, `[dynamics]` and `[[effect]]` have keys that depend on the model: they are read in
-//! `columns_in_file.rs`, `drive.rs`, `sections.rs` and `effects_in_file.rs`.
+//! `[columns]`, `[drive]`, `[dynamics]`, `[logs]` and `[[effect]]` have keys that depend on the model: they are read in
+//! `columns_in_file.rs`, `drive.rs`, `sections.rs`, `logs_in_file.rs` and `effects_in_file.rs`.
 
 use super::effect::ActsOn;
 use super::effect::Measure;
 use super::effect::ShowsIn;
 use super::filter::CommandFilter;
 use super::reader::{Entry, FileError, Located, Section};
-use super::values::{ColumnName, EachLog, Limits, Named, OrTable, Read};
+use super::values::{ColumnName, EachLog, Limits, Named, OrTable, Per, Read};
 use crate::data::TorqueColumn;
 use crate::expr::Formula;
 
@@ -51,6 +51,7 @@ tables! {
         system: SystemTable<'a>,
         columns: Option<Section<'a>>,
         log: Option<LogTable<'a>>,
+        logs: Named<Section<'a>>,
         drive: Option<Section<'a>>,
         parameters: Named<ParameterTable<'a>>,
         dynamics: Option<Section<'a>>,
@@ -92,6 +93,8 @@ tables! {
         bounds: Option<Limits>,
         fixed: bool,
         ci95: Option<Limits>,
+        per: Option<Per>,
+        logs: Named<OrTable<f64, ValueTable<'a>>>,
     }
 
     struct ChainTable<'a> {

@@ -42,9 +42,16 @@ pub(super) struct Limits(pub [f64; 2]);
 /// The name of a log's column, or its number, from 1.
 pub(super) struct ColumnName(pub String);
 
-/// What has a separate value of a parameter.
+/// What has a separate value of an effect's parameter.
 #[derive(Clone, Copy)]
 pub(super) struct EachLog;
+
+/// What has a separate value of a declared parameter.
+#[derive(Clone, Copy)]
+pub(super) enum Per {
+    Log,
+    Group,
+}
 
 impl<'a, T: Read<'a>> Read<'a> for Option<T> {
     const NAMES: [&'static str; 2] = T::NAMES;
@@ -258,6 +265,10 @@ impl Word for ShowsIn {
 
 impl Word for EachLog {
     const WORDS: &'static [(&'static str, Self)] = &[("log", Self)];
+}
+
+impl Word for Per {
+    const WORDS: &'static [(&'static str, Self)] = &[("log", Self::Log), ("group", Self::Group)];
 }
 
 impl Word for Status {

@@ -23,7 +23,9 @@ impl Model {
             }
             for (k, parameter) in effect.effect.parameters.iter().enumerate() {
                 let (value, ci95) = effect.values[k];
-                let entry = value_and_interval(value, ci95) + &of_logs(effect, k);
+                let of_logs = of_logs(&effect.own, k);
+                let of_logs = of_logs.map(|logs| format!(", logs = {logs}"));
+                let entry = value_and_interval(value, ci95) + &of_logs.unwrap_or_default();
                 let _ = writeln!(text, "{} = {{ {entry} }}", parameter.name);
             }
             if effect.fixed {
@@ -36,7 +38,7 @@ impl Model {
     fn declaration_with_values(&self) -> String {
         let mut document: toml_edit::DocumentMut =
             (self.declaration.parse()).expect("the declaration was read as TOML before");
-        for parameter in &self.parameters {
+        for (k, parameter) in self.parameters.iter().enumerate() {
             let entry = &mut document["parameters"][&parameter.name];
             if let Some(table) = entry.as_table_like_mut() {
                 table.insert("value", toml_edit::value(parameter.value));
@@ -48,6 +50,11 @@ impl Model {
                     _ => {
                         table.remove("ci95");
                     }
+                }
+                table.remove("logs");
+                if let Some(logs) = of_logs(&self.own, k) {
+                    let logs: toml_edit::Value = logs.parse().expect("it is written as TOML");
+                    table.insert("logs", toml_edit::value(logs));
                 }
             }
         }
@@ -76,11 +83,11 @@ fn value_and_interval(value: f64, ci95: Option<[f64; 2]>) -> String {
     format!("value = {value:?}{}", interval.unwrap_or_default())
 }
 
-/// Per-log values, each under its log's file name, or under its path if file names are equal.
-fn of_logs(effect: &FittedEffect, k: usize) -> String {
-    let own: Vec<&PerLogValue> = effect.own.iter().filter(|own| own.parameter == k).collect();
+/// The per-log values of a parameter, each under its log's file name, or under its path if file names are equal.
+fn of_logs(own: &[PerLogValue], k: usize) -> Option<String> {
+    let own: Vec<&PerLogValue> = own.iter().filter(|own| own.parameter == k).collect();
     if own.is_empty() {
-        return String::new();
+        return None;
     }
     let entry = |of: &&PerLogValue| {
         let alone = own
@@ -93,5 +100,5 @@ fn of_logs(effect: &FittedEffect, k: usize) -> String {
         format!("{} = {{ {value} }}", toml_edit::Key::new(name))
     };
     let entries: Vec<String> = own.iter().map(entry).collect();
-    format!(", logs = {{ {} }}", entries.join(", "))
+    Some(format!("{{ {} }}", entries.join(", ")))
 }

@@ -68,6 +68,7 @@ impl SavedModel {
             parameters: values.map(|(p, value)| p.restore(*value)).collect(),
             reading: None,
             own: Vec::new(),
+            configurations: Vec::new(),
         };
         let networks = numbers.prior.iter().chain(&numbers.residual);
         ReferenceModel::new(equations, networks, self.integrator, self.step_s)

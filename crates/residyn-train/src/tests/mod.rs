@@ -35,6 +35,7 @@ pub(super) fn parameter(name: &str, value: f64) -> Parameter {
         bounds: [f64::NEG_INFINITY, f64::INFINITY],
         fixed: false,
         per_log: false,
+        per_group: false,
         ci95: None,
         scale: value.abs(),
     }
@@ -59,6 +60,7 @@ pub(super) fn one_joint(formula: &str, parameters: Vec<Parameter>) -> Dynamics {
         filters: Vec::new(),
         reading: None,
         own: Vec::new(),
+        configurations: Vec::new(),
     }
 }
 

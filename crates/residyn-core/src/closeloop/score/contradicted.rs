@@ -58,6 +58,7 @@ mod tests {
             bounds: [0.0, f64::INFINITY],
             fixed: false,
             per_log: false,
+            per_group: false,
             ci95,
             scale: 1.0,
         }

@@ -153,7 +153,11 @@ impl Scorer<'_> {
     }
 
     fn zeroed(&self, after: &Fitted) -> Option<Assessment> {
-        let differs = after.model.all_parameters().iter().any(|p| p.per_log);
+        let differs = after
+            .model
+            .effects
+            .iter()
+            .any(|effect| effect.effect.parameters.iter().any(|p| p.per_log));
         let mut logs = self.test.to_vec();
         let seconds = self.settings.zeroed_on_s;
         let dynamics = after.model.dynamics();

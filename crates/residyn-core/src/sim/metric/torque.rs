@@ -191,7 +191,7 @@ fn differences(model: &Model, balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec
         ..logged.clone()
     };
     let found = balance_of(&in_log, &acting);
-    (model.with_drive_torques(logged), found)
+    (model.with_drive_torques(log, logged), found)
 }
 
 /// The values of a torque balance along a smoothed motion with its torques, `[joint][row]`.
