@@ -118,12 +118,18 @@ fn a_known_load_and_two_gains_tell_what_the_drive_hides() {
     let (found, half) = fitted(&declared, &logs);
     for (name, truth) in [("g1", 0.25), ("d1", 0.012), ("J", 0.023), ("G", 0.7)] {
         let (value, half) = (value(&found, name, &logs[0]), of_name(&half, name));
-        assert!((value - truth).abs() < 2.0 * half, "{name}: {value} +- {half}");
+        assert!(
+            (value - truth).abs() < 2.0 * half,
+            "{name}: {value} +- {half}"
+        );
     }
     assert!(of_name(&half, "g1") < 0.05, "{half:?}");
     // At one gain and without the load all torques could be larger.
     let (_, alone) = fitted(&declared, &logs[..1]);
-    assert!(of_name(&alone, "g1") > 10.0 * of_name(&half, "g1"), "{alone:?}");
+    assert!(
+        of_name(&alone, "g1") > 10.0 * of_name(&half, "g1"),
+        "{alone:?}"
+    );
     // The gains of the logs stay those of the file, whatever is fitted, and so does the file.
     assert_eq!(value(&found, "kp", &logs[2]), 30.0);
     assert_eq!(value(&found, "m", &logs[1]), 0.0);
@@ -226,6 +232,9 @@ fn a_pattern_that_matches_no_log_is_said() {
     scratch.simulates("servo-real", &[1]);
     let said = scratch.run("audit --model servo.toml run1.csv").stderr;
     let said = String::from_utf8(said).unwrap();
-    says(&said, &["[logs.\"nothing*\"] of the model matches none of these logs"]);
+    says(
+        &said,
+        &["[logs.\"nothing*\"] of the model matches none of these logs"],
+    );
     assert!(!said.contains("run*"));
 }

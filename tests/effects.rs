@@ -21,7 +21,7 @@ const ROUNDING: f64 = 1e-12;
 type Meaning = fn(&[f64], f64, f64, f64) -> f64;
 
 /// Effects of kind torque. The forces are the laws by which the benches simulate them.
-const MEANINGS: [(&str, Meaning); 3] = [
+const MEANINGS: [(&str, Meaning); 4] = [
     ("actuator_gain", |p, _, _, tau| (1.0 + p[0]) * tau),
     ("actuator_deadzone", |p, _, _, tau| match tau {
         tau if tau > p[0] => tau - p[0],
@@ -32,6 +32,10 @@ const MEANINGS: [(&str, Meaning); 3] = [
         tau if tau > p[0] => p[0],
         tau if tau < -p[0] => -p[0],
         tau => tau,
+    }),
+    ("torque_speed_limit", |p, _, v, tau| {
+        let limit = (p[0] * (1.0 - v.abs() / p[1])).max(0.0);
+        tau.abs().min(limit).copysign(tau)
     }),
 ];
 

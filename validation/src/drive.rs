@@ -19,6 +19,8 @@ pub struct Shape {
     pub limit: f64,
     /// Decrease of the limit with speed in the direction of the torque \[N m s/rad\].
     pub back_emf: f64,
+    /// Speed at which nothing is left of the limit, whichever way the joint moves \[rad/s\].
+    pub no_load_speed: f64,
 }
 
 impl Default for Shape {
@@ -28,6 +30,7 @@ impl Default for Shape {
             deadzone: 0.0,
             limit: f64::INFINITY,
             back_emf: 0.0,
+            no_load_speed: f64::INFINITY,
         }
     }
 }
@@ -38,7 +41,9 @@ impl Shape {
         let torque = (1.0 + self.gain) * torque;
         let size = (torque.abs() - self.deadzone).max(0.0);
         let falls = self.back_emf * (v * torque.signum()).max(0.0);
-        size.min((self.limit - falls).max(0.0)).copysign(torque)
+        let left = (1.0 - v.abs() / self.no_load_speed).max(0.0);
+        size.min((self.limit - falls).max(0.0) * left)
+            .copysign(torque)
     }
 }
 
@@ -99,6 +104,15 @@ mod tests {
         assert_eq!(motor.at(3.0, 4.0), 1.0);
         assert_eq!(motor.at(-3.0, 4.0), -2.0);
         assert_eq!(motor.at(3.0, 40.0), 0.0);
+    }
+
+    #[test]
+    fn nothing_is_left_of_the_limit_at_the_no_load_speed() {
+        let motor = shape(|s| (s.limit, s.no_load_speed) = (2.0, 8.0));
+        assert_eq!(motor.at(3.0, 4.0), 1.0);
+        assert_eq!(motor.at(-3.0, 4.0), -1.0);
+        assert_eq!(motor.at(0.5, 4.0), 0.5);
+        assert_eq!(motor.at(3.0, 9.0), 0.0);
     }
 
     #[test]

@@ -110,6 +110,9 @@ impl Machine {
             "actuator_deadzone" => drive.shape.deadzone = n("w")?,
             "actuator_saturation" => drive.shape.limit = n("m")?,
             "back_emf_limit" => (drive.shape.limit, drive.shape.back_emf) = (n("m")?, n("k")?),
+            "torque_speed_limit" => {
+                (drive.shape.limit, drive.shape.no_load_speed) = (n("tau_max")?, n("v_0")?);
+            }
             "actuator_delay" => drive.delay = n("d")?,
             "actuator_lag" => drive.lag = n("T")?,
             "backlash" => self.transmissions[j] = Some(Transmission::backlash(n("delta")?)),
@@ -205,6 +208,7 @@ mod tests {
             hidden("uneven_friction", &[("F", 0.1), ("a", 0.5)]),
             hidden("presliding", &[("F_c", 0.2), ("sigma", 10.0)]),
             hidden("back_emf_limit", &[("m", 2.0), ("k", 0.1)]),
+            hidden("torque_speed_limit", &[("tau_max", 2.0), ("v_0", 12.0)]),
         ];
         for effect in &against {
             assert!(adds(effect) < -1e-3, "{effect:?}: {}", adds(effect));

@@ -47,7 +47,8 @@ impl Values {
                 value: p.value,
                 is_given: p.fixed,
             });
-            let new = new.filter(|new| parameters[new.parameter].per_group && !is_known(new.parameter));
+            let new =
+                new.filter(|new| parameters[new.parameter].per_group && !is_known(new.parameter));
             let own = |found: &InLog| Own {
                 log: index,
                 parameter: found.parameter,
