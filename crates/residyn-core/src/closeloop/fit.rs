@@ -101,7 +101,7 @@ impl<'a> Problem<'a> {
     /// it should. Without one if the model diverges or most rigs have nothing that the file lacks.
     pub(super) fn with_first_optimum(&self) -> Self {
         let found = self.near_first_optimum(self.declared);
-        let step_s = found.first.as_ref().map(|first| found.stable_step_s(first));
+        let step_s = (found.first.as_ref()).map(|first| found.stable_step_s(&first.model));
         match step_s.filter(|step_s| *step_s < found.shooting.longest_s()) {
             Some(step_s) => {
                 let shooting = found.shooting.clone().in_steps_of(step_s);
@@ -122,9 +122,9 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The longest step that a fitted model's friction allows.
-    fn stable_step_s(&self, fitted: &Fitted) -> f64 {
-        let stable_s = longest_stable_step(&self.shooting, &self.compiled(&fitted.model));
+    /// The longest step that a model's friction allows.
+    pub(super) fn stable_step_s(&self, model: &Model) -> f64 {
+        let stable_s = longest_stable_step(&self.shooting, &self.compiled(model));
         stable_s.max(self.settings.fit.shortest_step_s)
     }
 

@@ -20,7 +20,7 @@ use super::select::{Rival, Round, Tried};
 use super::stage::Watch;
 use crate::data::{Audit, Joint, Log};
 use crate::identify::{FitError, as_it_stands};
-use crate::model::{FittedEffect, Model, PerLogValue};
+use crate::model::{FittedEffect, Library, Model, PerLogValue};
 
 /// As [`find`], limb by limb; `None` if there is only one limb, or motion is compared, in which all joints are one part.
 pub(super) fn find_in_limbs<'a>(
@@ -59,7 +59,7 @@ pub(super) fn find_in_limbs<'a>(
 }
 
 /// A limb, and what the logs hold of it.
-struct Limb {
+pub(super) struct Limb {
     joints: Vec<Joint>,
     model: Model,
     logs: Vec<Log>,
@@ -68,7 +68,7 @@ struct Limb {
 }
 
 impl Limb {
-    fn of(problem: &Problem<'_>, apart: &[Log], joints: Vec<Joint>) -> Self {
+    pub(super) fn of(problem: &Problem<'_>, apart: &[Log], joints: Vec<Joint>) -> Self {
         let own = |logs: &[Log]| logs.iter().map(|log| log.of_joints(&joints)).collect();
         Self {
             model: problem.declared.limb(&joints),
@@ -84,17 +84,30 @@ impl Limb {
     /// What the limb lacks.
     fn find<'l>(
         &'l self,
-        whole: &'l Problem<'_>,
+        whole: &Problem<'l>,
         rng: &mut impl Rng,
         watch: &dyn Watch,
     ) -> Result<Found<'l>, StudyError> {
-        let logs = (self.logs.as_slice(), self.audits.clone());
-        let (model, library, settings) = (&self.model, whole.library, whole.settings);
-        let problem = Problem {
-            solver: whole.solver,
-            ..Problem::audited(model, library, whole.error_model, logs, settings)
-        };
+        let problem = self.problem(whole, whole.library, whole.error_model);
         find(problem.fit_declared()?, &self.apart, rng, watch)
+    }
+
+    pub(super) fn joints(&self) -> &[Joint] {
+        &self.joints
+    }
+
+    /// The limb's part of a problem, with these effects and errors.
+    pub(super) fn problem<'l>(
+        &'l self,
+        whole: &Problem<'l>,
+        library: &'l Library,
+        errors: ErrorModel,
+    ) -> Problem<'l> {
+        let logs = (self.logs.as_slice(), self.audits.clone());
+        Problem {
+            solver: whole.solver,
+            ..Problem::audited(&self.model, library, errors, logs, whole.settings)
+        }
     }
 
     fn of_whole(&self, effect: &FittedEffect) -> FittedEffect {
@@ -102,7 +115,7 @@ impl Limb {
     }
 
     /// Write the declared part of a fitted limb into the whole; its added effects are returned.
-    fn put_into(&self, whole: &mut Model, limb: &Model) -> Vec<FittedEffect> {
+    pub(super) fn put_into(&self, whole: &mut Model, limb: &Model) -> Vec<FittedEffect> {
         let free = (self.model.parameters.iter()).map(|declared| !declared.fixed);
         for ((own, found), free) in whole.parameters.iter_mut().zip(&limb.parameters).zip(free) {
             if free {

@@ -6,6 +6,7 @@
 //! [`score`]. They work on a [`Problem`], which none of them changes.
 
 mod by_log;
+mod by_motion;
 mod calibrate;
 mod diagnostics;
 mod discriminate;

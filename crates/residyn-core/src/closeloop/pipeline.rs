@@ -50,6 +50,7 @@ pub fn solve(
     let alternatives = discriminate(&found, watch);
     let mut refined = refine(&found, watch);
     found.chosen.confirm(&mut refined);
+    refined.estimate_by_motion();
     let diagnostics = Diagnostics::of(&found, &refined);
     let with_friction = found.problem.with_usual_friction();
     let noted = noted(

@@ -1,0 +1,168 @@
+//! Stage 7, at its end: a machine on position control, whose model was found by the torques of its drives' law, estimated
+//! again by its motion under the logged commands.
+//!
+//! Torques are compared through a low-pass filter, which blurs every reversal and every late command alike on both sides
+//! of the equation, but not quite: friction, delays and rotors come out a few percent off. Motion under the commands is
+//! what the model is for, and closed loops do not diverge.
+
+use rayon::prelude::*;
+
+use super::error_model::ErrorModel;
+use super::fit::NOTHING;
+use super::fitted::Fitted;
+use super::limbs::Limb;
+use super::problem::Problem;
+use super::refine::{Refined, with_intervals};
+use crate::data::Quantity;
+use crate::identify::{FitError, LevenbergMarquardt, Window, uncertainty};
+use crate::model::Model;
+use crate::sim::metric::errors_in;
+
+/// Parts of the logs that are left out of the fit in turn.
+const PARTS: usize = 2;
+/// Stretches of each part: one that is slow, say, has others beside it.
+const STRETCHES: usize = 4;
+/// Most steps of a fit that only has to show whether motion says more: it starts near its end.
+const TRIAL: LevenbergMarquardt = LevenbergMarquardt {
+    most_steps: 6,
+    ..LevenbergMarquardt::USUAL
+};
+
+impl Refined<'_> {
+    /// The declared and the chosen model by motion, limb by limb, wherever a fit to motion predicts stretches of the logs
+    /// that it has not seen better than a fit to torques does. Rigs whose torques are measured stay as they are.
+    pub(super) fn estimate_by_motion(&mut self) {
+        let problem = &self.problem;
+        let is_of_law = problem.error_model == ErrorModel::InverseDynamics
+            && problem.declared.driven_by() == Quantity::Command;
+        if !is_of_law || self.failure.is_some() {
+            return;
+        }
+        let limbs = self.after.model.limbs();
+        let limbs = limbs
+            .into_iter()
+            .map(|joints| Limb::of(problem, &[], joints));
+        let limbs: Vec<Limb> = limbs.collect();
+        for fitted in [&mut self.before, &mut self.after] {
+            let found = limbs.par_iter().map(|limb| {
+                let model = fitted.model.limb(limb.joints());
+                Comparison::of(problem, limb).better(&model)
+            });
+            let found: Vec<Option<Model>> = found.collect();
+            for (limb, found) in limbs.iter().zip(found) {
+                if let Some(found) = found {
+                    limb.put_into(&mut fitted.model, &found);
+                }
+            }
+        }
+    }
+}
+
+/// A limb's logs, compared by motion and by the torques that the law of its drives asks for.
+struct Comparison<'l> {
+    motion: Problem<'l>,
+    /// The same with friction that reverses as slowly as in the torques, so that steps may be longer.
+    trial: Problem<'l>,
+    torques: Problem<'l>,
+}
+
+impl<'l> Comparison<'l> {
+    fn of(whole: &Problem<'l>, limb: &'l Limb) -> Self {
+        let of_joints = |all: &[f64]| -> Vec<f64> {
+            let joints = limb.joints().iter();
+            joints.map(|joint| all[*joint]).collect()
+        };
+        let widths = of_joints(&whole.smoothing_velocities);
+        let problem = |errors| Problem {
+            held: whole.held.clone(),
+            ..limb.problem(whole, &NOTHING, errors)
+        };
+        let (motion, torques) = (
+            problem(ErrorModel::OutputError),
+            problem(ErrorModel::InverseDynamics),
+        );
+        let (windows, noise) = (
+            torques.shooting.windows.clone(),
+            of_joints(&whole.shooting.noise),
+        );
+        let shooting = torques
+            .error_model
+            .shooting(torques.logs, windows, &noise, &widths);
+        Self {
+            trial: Problem {
+                solver: &TRIAL,
+                ..motion.with_smoothing_velocities(widths.clone())
+            },
+            torques: torques
+                .with_smoothing_velocities(widths)
+                .over(shooting.near(torques.declared)),
+            motion,
+        }
+    }
+
+    /// The model by motion, with intervals, if each part of the logs says that motion predicts it better.
+    fn better(&self, model: &Model) -> Option<Model> {
+        let is_better = (0..PARTS).all(|part| self.gain(model, part) > 0.0);
+        if !is_better {
+            return None;
+        }
+        let problem = in_stable_steps(&self.motion, model);
+        let coarse = estimate(&problem, model).ok()?;
+        let fine = problem.refined();
+        let found = estimate(&fine, &coarse.model).ok()?;
+        let uncertainty = uncertainty(&fine.shooting, &found.fit);
+        Some(with_intervals(&fine, &found, &uncertainty, &coarse.model))
+    }
+
+    /// By how much motion is the better guide to a part that is left out: the logarithm of the ratio of the errors.
+    fn gain(&self, model: &Model, part: usize) -> f64 {
+        let trial = in_stable_steps(&self.trial, model);
+        let (left_out, kept) = parted(&trial.shooting.windows, part);
+        let error = |guide: &Problem<'l>, start: &Model| {
+            let kept = guide.over(guide.shooting.over(kept.clone()));
+            let fitted = estimate(&kept, start).ok()?;
+            Some((squares(&trial, &fitted.model, &left_out), fitted.model))
+        };
+        let Some((by_torques, model)) = error(&self.torques, model) else {
+            return 0.0;
+        };
+        error(&trial, &model).map_or(0.0, |(by_motion, _)| log_ratio(&by_torques, &by_motion))
+    }
+}
+
+/// The windows of a part of the logs, and the others.
+fn parted(windows: &[Window], part: usize) -> (Vec<Window>, Vec<Window>) {
+    let stretch = |k: usize| k * PARTS * STRETCHES / windows.len();
+    let (own, others): (Vec<_>, Vec<_>) =
+        (windows.iter().enumerate()).partition(|(k, _)| stretch(*k) % PARTS == part);
+    let windows = |of: Vec<(usize, &Window)>| of.into_iter().map(|(_, window)| *window).collect();
+    (windows(own), windows(others))
+}
+
+/// The problem in steps in which a model's friction brings each joint to rest as it should.
+fn in_stable_steps<'l>(problem: &Problem<'l>, model: &Model) -> Problem<'l> {
+    let step_s = problem.stable_step_s(model);
+    match step_s < problem.shooting.longest_s() {
+        true => problem.over(problem.shooting.clone().in_steps_of(step_s)),
+        false => problem.clone(),
+    }
+}
+
+fn estimate(problem: &Problem<'_>, model: &Model) -> Result<Fitted, FitError> {
+    let start_states = problem.shooting.initial_start_states(0);
+    problem.refit(model, start_states, None)
+}
+
+/// Sums of the squared position errors in these windows, one per joint.
+fn squares(problem: &Problem<'_>, model: &Model, windows: &[Window]) -> Vec<f64> {
+    let (dynamics, step_s) = (model.dynamics(), problem.shooting.longest_s());
+    let errors = errors_in(&dynamics, problem.logs, windows, step_s);
+    let of_joint = |j: usize| errors.iter().map(|error| error.position[j]).sum();
+    (0..model.joints).map(of_joint).collect()
+}
+
+/// The logarithm of the ratios of two such sums, on average: joints count alike, however far they move.
+fn log_ratio(own: &[f64], other: &[f64]) -> f64 {
+    let of_joint = |(own, other): (&f64, &f64)| (own / other).ln();
+    own.iter().zip(other).map(of_joint).sum::<f64>() / own.len() as f64
+}
