@@ -424,15 +424,17 @@ mod slow {
         scratch.file("legs.toml", known);
         let report = scratch.json(&format!("closeloop --model legs.toml {LOGS}"));
         // What each motor has, and nothing else; the hip's rotor is part of the thigh's inertia.
-        let delays = [1, 2, 3, 4].map(|joint| ("actuator_delay", joint, 0.008));
+        // MuJoCo updates positions with the new velocities: half a step ahead.
+        let delays = [1, 2, 3, 4].map(|joint| ("actuator_delay", joint, 0.008 - 2.5e-5));
         let friction = [(2, 0.15), (3, 0.4), (4, 0.15)];
         let friction = friction.map(|(joint, level)| ("coulomb_friction", joint, level));
         let rotors = [2, 4].map(|joint| ("rotor_inertia", joint, 0.01));
         let truth = [delays.as_slice(), &friction, &rotors].concat();
         for (name, joint, truth) in &truth {
             let [value, ..] = found(&report, name, *joint).unwrap();
+            // Found by torques, to within 7 %, and estimated by motion.
             assert!(
-                (value / truth - 1.0).abs() < 0.07,
+                (value / truth - 1.0).abs() < 0.005,
                 "{name} {joint}: {value}"
             );
         }
@@ -449,6 +451,80 @@ mod slow {
         };
         assert!(error("after") < 0.2 * error("before"), "{report:#}");
     }
+
+    /// What two legs with known gains, at two stiffnesses and with a load in some of the logs, have beyond their drawing.
+    const LOADED: &str = "
+actuator_gain    | 1 | g = -0.2
+coulomb_friction | 1 | F_c = 0.4
+coulomb_friction | 2 | F_c = 0.15
+coulomb_friction | 3 | F_c = 0.4
+coulomb_friction | 4 | F_c = 0.15
+actuator_delay   | 1 | d = 0.008
+actuator_delay   | 2 | d = 0.008
+actuator_delay   | 3 | d = 0.008
+actuator_delay   | 4 | d = 0.008
+rotor_inertia    | 2 | J = 0.01
+rotor_inertia    | 4 | J = 0.01
+";
+
+    /// Bodies that a fit may change, friction and one gain do not tell how strong a drive is; a load that the user knows
+    /// does.
+    #[test]
+    fn a_known_load_in_some_logs_tells_the_scale_of_a_drive() {
+        let scratch = Scratch::new();
+        scratch.file("drawn.xml", legs([""; 2], [""; 2]));
+        scratch.succeeds("new --from-mjcf drawn.xml --bare-joints --out legs.toml");
+        let known = scratch.read("legs.toml");
+        let known = known.replace("unit = \"N m/rad\"", "unit = \"N m/rad\", fixed = true");
+        let known = known.replace("unit = \"N m s/rad\"", "unit = \"N m s/rad\", fixed = true");
+        let stiffer = "kp_1 = 108\nkp_2 = 45\nkp_3 = 108\nkp_4 = 45\n";
+        let tables = format!("[logs.\"stiff*\"]\n{stiffer}[logs.\"loaded*\"]\n{stiffer}");
+        let load = |joint: usize, mass: &str| {
+            let place = "x = -0.25\ny = 0\nz = 0\nfixed = true\n";
+            format!("[[effect]]\nname = \"payload\"\njoint = {joint}\nm = {mass}\n{place}")
+        };
+        let some = "{ value = 0, logs = { \"loaded*\" = 0.5 } }";
+        let loads = load(2, some) + &load(4, some);
+        scratch.file("known.toml", format!("{known}\n{tables}{loads}"));
+        let kinds = [("run", "0.0", 1), ("stiff", "0.0", 3), ("loaded", "0.5", 5)];
+        for (kind, mass, seed) in kinds {
+            let built = [known.clone(), load(2, mass), load(4, mass), effects(LOADED)];
+            scratch.file("built.toml", built.join("\n"));
+            let gains = match kind {
+                "run" => "",
+                _ => "kp_1 = 108.0, kp_2 = 45.0, kp_3 = 108.0, kp_4 = 45.0",
+            };
+            scratch.file(
+                "plant.toml",
+                format!("model = \"built.toml\"\nparameters = {{ {gains} }}\n{MOVED}"),
+            );
+            for k in 0..2 {
+                let seed = seed + k;
+                scratch.succeeds(&format!(
+                    "simulate --plant plant.toml --out {kind}{k}.csv --seed {seed}"
+                ));
+            }
+        }
+        let report = scratch.json(
+            "closeloop --model known.toml --train run0.csv stiff0.csv loaded0.csv \
+             --test run1.csv stiff1.csv loaded1.csv --out out",
+        );
+        assert_eq!(report["verdict"], "explained", "{report:#}");
+        let hidden: Vec<[String; 3]> = rows(LOADED);
+        assert_eq!(report["effects"].as_array().unwrap().len(), hidden.len());
+        for [name, joint, value] in hidden {
+            let (_, truth) = value.split_once(" = ").unwrap();
+            let estimate = found(&report, &name, joint.parse().unwrap()).unwrap();
+            let is_held = holds(estimate, truth.parse().unwrap());
+            assert!(is_held, "{name} {joint}: {estimate:?}");
+        }
+    }
+
+    const MOVED: &str = "
+sensor = { rate_hz = 200, position_noise = 2e-4, position_step = 0 }
+excitation = { amplitude = [0.6, 0.6, 0.6, 0.6], band_hz = [0.1, 3.0], tones = 8 }
+recording = { logs = 1, duration_s = 15, start = [0, 0, 0, 0, 0, 0, 0, 0] }
+";
 
     #[test]
     fn what_a_servo_hides_is_named() {
