@@ -137,6 +137,11 @@ impl<'r> OfJoint<'r> {
         self.model.iter().any(is_it)
     }
 
+    fn was_taken(&self, effect: &EffectName) -> bool {
+        let mut added = self.chosen().flat_map(|change| &change.added);
+        added.any(|own| own.label == effect.label)
+    }
+
     /// In the order in which it was taken: `coulomb_friction and viscous_friction 96.6 % (with 4 on other joints); load_friction
     /// 13.0 %`
     fn taken(&self) -> String {
@@ -175,8 +180,8 @@ impl<'r> OfJoint<'r> {
         names(&dropped)
     }
 
-    /// The effect that did most on its own without being taken at last, and why it was not: `cogging_torque 3.1 %: load_friction
-    /// on joint 1 did more, 13.0 %`
+    /// The effect that did most on its own and was never taken, and why it was not: `cogging_torque 3.1 %: load_friction on
+    /// joint 1 did more, 13.0 %`
     fn refused(&self) -> String {
         let alone = self
             .changes
@@ -187,7 +192,10 @@ impl<'r> OfJoint<'r> {
             });
         let refused = alone.filter(|(change, effect)| {
             let is_own = effect.on().contains(&self.joint);
-            is_own && change.of.gain > LEAST_GAIN && !self.is_in_model(effect)
+            is_own
+                && change.of.gain > LEAST_GAIN
+                && !self.is_in_model(effect)
+                && !self.was_taken(effect)
         });
         let best = refused.max_by(|a, b| a.0.of.gain.total_cmp(&b.0.of.gain));
         best.map_or_else(String::new, |(change, effect)| {
@@ -275,8 +283,10 @@ mod tests {
                 set(&with(&[("delay", 1)]), 0.3, true),
                 set(&with(&[("lag", 1)]), 0.2, false),
                 set(&with(&[("lag", 2)]), 0.04, false),
+                set(&with(&[("drag", 1)]), 0.25, false),
             ],
             vec![set(&with(&[("delay", 1), ("lag", 1)]), 0.001, false)],
+            vec![set(&with(&[("delay", 1), ("drag", 1)]), 0.002, true)],
             // Another limb.
             vec![set(&[("spring", 3)], 0.5, true)],
         ];
@@ -299,7 +309,7 @@ mod tests {
             said(first),
             [
                 "friction 90.0 % (with 1 on other joints); delay 30.0 %",
-                "",
+                "drag",
                 "lag 20.0 %: delay on joint 1 did more, 30.0 %"
             ]
         );
