@@ -186,6 +186,10 @@ fn measure(
     model: &ExportModel,
     arguments: &Arguments,
 ) -> Result<Difference, ClientError> {
+    // Nobody asks for samples, which take seconds for a rig of many joints.
+    if let Client::None(reason) = &format.client {
+        return Err(ClientError::Unavailable((*reason).to_owned()));
+    }
     let mut rng = rng(arguments.common.seed);
     let refused = |error: residyn_core::model::NetworkError| ClientError::Failed(error.to_string());
     let samples = model.samples(&mut rng).map_err(refused)?;
