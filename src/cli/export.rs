@@ -1,8 +1,9 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
+use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
@@ -16,7 +17,7 @@ use residyn_formats::{
     Client, ClientError, Difference, ExportModel, File, Format, WrittenBack, find, rollout_s,
     write_back,
 };
-use residyn_io::files::{OutputError, folder_of, write_whole};
+use residyn_io::files::{OutputError, folder_of, read_text, write_whole};
 use residyn_io::read_model;
 use residyn_train::{Checkpoint, Manifest};
 
@@ -25,6 +26,7 @@ use residyn_train::{Checkpoint, Manifest};
 #[command(after_help = "Examples:\n  \
     residyn export --checkpoint closeloop-report/checkpoint --format onnx --out pendulum.onnx\n  \
     residyn export --model closeloop-report/model.toml --format c --out pendulum.h --step 0.001\n  \
+    residyn export --model report/model.toml --ranges report/ranges.json --format isaaclab --out robot.py\n  \
     residyn export --model report/model.toml --into arm.urdf --out arm-fitted.urdf")]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -39,6 +41,10 @@ pub(super) struct Arguments {
     /// With --into: the last link, as given to `residyn new`
     #[arg(long, value_name = "LINK", requires = "into")]
     tip: Option<String>,
+    /// The ranges.json of a report, whose ranges from run to run replace the intervals in the model: what isaaclab and
+    /// mjlab draw
+    #[arg(long, value_name = "FILE", requires = "format")]
+    ranges: Option<PathBuf>,
     /// Output path
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
@@ -69,6 +75,10 @@ fn write(arguments: &Arguments, format: &'static Format) -> Result<Answer> {
     let model = portable(arguments)?;
     let task = exported_task(model.name());
     let model = model.with_task(task);
+    let model = match &arguments.ranges {
+        Some(file) => in_ranges(model, file)?,
+        None => model,
+    };
     let not_carried = (format.not_carried)(&model);
     if let Some(message) = steps_message(format, &model, arguments)? {
         terminal::say(message);
@@ -79,7 +89,7 @@ fn write(arguments: &Arguments, format: &'static Format) -> Result<Answer> {
     let measured = terminal::stage("comparing with a client of the format", compare);
     terminal::print(&match arguments.common.json {
         true => format!("{:#}\n", printed(format, &files, &not_carried, &measured)),
-        false => text(format, &files, &measured, model.step_s),
+        false => text(format, &files, &not_carried, &measured, model.step_s),
     })?;
     if let Err(ClientError::Failed(said)) = &measured {
         bail!("what was written cannot be read: {said}");
@@ -89,6 +99,28 @@ fn write(arguments: &Arguments, format: &'static Format) -> Result<Answer> {
         Err(ClientError::Unavailable(_)) => Answer::Yes,
         _ => Answer::No,
     })
+}
+
+/// An entry of `ranges.json`.
+#[derive(Deserialize)]
+struct Range {
+    name: String,
+    /// An open end is null.
+    range: [Option<f64>; 2],
+}
+
+/// The model with the ranges of a file as intervals.
+fn in_ranges(model: ExportModel, file: &Path) -> Result<ExportModel> {
+    let at_file = || file.display().to_string();
+    let text = read_text(file).with_context(at_file)?;
+    let ranges: Vec<Range> = serde_json::from_str(&text).with_context(at_file)?;
+    let closed = |one: &Range| Some([one.range[0]?, one.range[1]?]);
+    let named = ranges
+        .iter()
+        .filter_map(|one| Some((one.name.as_str(), closed(one)?)));
+    let named: Vec<(&str, [f64; 2])> = named.collect();
+    let other = |why| anyhow!("{}: of another model: {why}", file.display());
+    model.with_intervals(&named).map_err(other)
 }
 
 /// What to do if the steps are too long for the friction of a model at rest. Files that nobody can step have none.
@@ -154,6 +186,10 @@ fn measure(
     model: &ExportModel,
     arguments: &Arguments,
 ) -> Result<Difference, ClientError> {
+    // Nobody asks for samples, which take seconds for a rig of many joints.
+    if let Client::None(reason) = &format.client {
+        return Err(ClientError::Unavailable((*reason).to_owned()));
+    }
     let mut rng = rng(arguments.common.seed);
     let refused = |error: residyn_core::model::NetworkError| ClientError::Failed(error.to_string());
     let samples = model.samples(&mut rng).map_err(refused)?;
@@ -240,6 +276,7 @@ fn printed(
 fn text(
     format: &Format,
     files: &[File],
+    not_carried: &[String],
     measured: &Result<Difference, ClientError>,
     step_s: f64,
 ) -> String {
@@ -268,13 +305,19 @@ fn text(
                 parts.join(", ")
             );
             if difference.pointwise() > format.tolerance {
+                let why = match not_carried {
+                    [] => "",
+                    _ => ": what is not carried shows in it",
+                };
                 let _ = writeln!(
                     out,
-                    "this exceeds the tolerance of {:.0e}",
+                    "this exceeds the tolerance of {:.0e}{why}",
                     format.tolerance
                 );
             }
         }
+        // Nothing can be predicted from settings.
+        Err(_) if matches!(format.client, Client::None(_)) => {}
         Err(reason) => {
             let _ = writeln!(
                 out,

@@ -19,6 +19,7 @@ mod list;
 mod mbrl;
 mod merge;
 mod new;
+mod notes;
 mod progress;
 mod remedy;
 mod report;

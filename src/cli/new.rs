@@ -5,7 +5,7 @@ use clap::{Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, value_parse
 use serde_json::json;
 
 use super::gains::Gains;
-use super::{Answer, Common, terminal};
+use super::{Answer, Common, notes, terminal};
 use residyn_formats::{FORMATS, Format, RobotReader, model_of};
 use residyn_io::files::write_whole;
 
@@ -95,9 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     }
     let (model, notes) = (model_of(&tree)?, &tree.notes);
     let text = &model.text;
-    for note in notes {
-        terminal::say(format!("note: {note}"));
-    }
+    notes::say(notes);
     if let Some(out) = &arguments.out {
         write_whole(out, text.as_bytes())?;
     }

@@ -106,6 +106,28 @@ impl ExportModel {
         Self { task, ..self }
     }
 
+    /// The same model with these intervals of its parameters, by their names, in place of its own.
+    ///
+    /// # Errors
+    /// A parameter that the model lacks, or a value outside its interval.
+    pub fn with_intervals(mut self, intervals: &[(&str, [f64; 2])]) -> Result<Self, String> {
+        let parameters = &mut self.equations.parameters;
+        for (name, [low, high]) in intervals {
+            let named = |parameter: &&mut Parameter| parameter.name == *name;
+            let Some(own) = parameters.iter_mut().find(named) else {
+                return Err(format!("the model has no parameter `{name}`"));
+            };
+            let value = own.value;
+            if !(*low..=*high).contains(&value) {
+                return Err(format!(
+                    "`{name}` is {value} in the model, not within {low} to {high}"
+                ));
+            }
+            own.ci95 = Some([*low, *high]);
+        }
+        Ok(self)
+    }
+
     /// The model of a file, with the file's own values.
     pub fn of_system(
         system: &Model,
@@ -190,12 +212,7 @@ impl ExportModel {
 
     /// Whether the equations use the time.
     pub(super) fn depends_on_time(&self) -> bool {
-        let program = &self.equations.program;
-        let time = program.ops().iter().position(
-            |op| matches!(op, Op::Input(k) if *k as usize == self.equations.layout().time()),
-        );
-        let mut operands = program.ops().iter().flat_map(|op| op.operands());
-        operands.any(|node| Some(node.index()) == time)
+        reads(&self.equations.program, self.equations.layout().time())
     }
 
     /// The effect that a parameter of this name belongs to.
@@ -309,6 +326,14 @@ impl ExportModel {
     pub fn predict(&self, samples: &Samples) -> Result<Predictions, NetworkError> {
         Ok(self.reference()?.predict(samples))
     }
+}
+
+/// Whether a program uses the input at this place.
+pub(super) fn reads(program: &Program, input: usize) -> bool {
+    let is_it = |op: &Op| matches!(op, Op::Input(k) if *k as usize == input);
+    let node = program.ops().iter().position(is_it);
+    let mut operands = program.ops().iter().flat_map(|op| op.operands());
+    operands.any(|operand| Some(operand.index()) == node)
 }
 
 /// Keep a value's interval from the file only if the value lies within it.

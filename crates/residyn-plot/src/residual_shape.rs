@@ -12,8 +12,9 @@ use residyn_core::data::Joint;
 
 /// Enough to show the cloud; a curve stands in front of it.
 const MAX_CLOUD_POINTS: usize = 1500;
-const PANEL_HEIGHT: f64 = 230.0;
 const PANEL_GAP: f64 = 16.0;
+/// Room for the heading of a row above the remarks on its panels, which are too narrow for both.
+const HEADING: f64 = 18.0;
 /// Points beyond these quantiles do not stretch an axis.
 const QUANTILES: (f64, f64) = (0.01, 0.99);
 
@@ -73,9 +74,14 @@ struct Shown<'a> {
 /// evenly.
 pub fn residual_shape(panels: &[ShapePanel], title: &str) -> Result<String, PlotError> {
     let (mut canvas, mut top) = begin(title, panels, entries)?;
+    let height = match panels.len() {
+        0..=3 => 230.0,
+        _ => 150.0,
+    };
     for panel in panels {
-        draw_row(&mut canvas, panel, top + HEAD);
-        top += HEAD + PANEL_HEIGHT + FOOT;
+        top += HEADING + HEAD;
+        draw_row(&mut canvas, panel, top, height);
+        top += height + FOOT;
     }
     Ok(canvas.finish(top + 6.0))
 }
@@ -99,19 +105,23 @@ fn columns(&ShapePanel { joint, kind, .. }: &ShapePanel) -> [Quantity; 4] {
     ]
 }
 
-fn draw_row(canvas: &mut Canvas, panel: &ShapePanel, top: f64) {
+fn draw_row(canvas: &mut Canvas, panel: &ShapePanel, top: f64, height: f64) {
     let residual = format!("residual {}", panel.kind.force_name());
     let residual = Quantity::new(residual, panel.kind.force_unit());
-    let y = Axis::vertical(force_range(panel), PANEL_HEIGHT, &residual);
+    let y = Axis::vertical(force_range(panel), height, &residual);
     let left = MARGIN + y.gutter();
     let width = (WIDTH - MARGIN - left - 3.0 * PANEL_GAP) / 4.0;
     let mut area = Area {
         x: left,
         y: top,
         width,
-        height: PANEL_HEIGHT,
+        height,
     };
-    canvas.add(heading(area, &format!("Joint {}", panel.label)));
+    let above = Area {
+        y: top - HEADING,
+        ..area
+    };
+    canvas.add(heading(above, &format!("Joint {}", panel.label)));
     for (k, column) in columns(panel).into_iter().enumerate() {
         let shown = panel.models.iter().map(|model| Shown {
             role: model.role,

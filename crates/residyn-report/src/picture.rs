@@ -17,6 +17,42 @@ use residyn_plot::{
 /// A picture shows this much of a log in s: more than that and predictions become a blur.
 const SHOWN_S: f64 = 8.0;
 
+/// Of a rig of many joints, a picture shows so many: more do not fit a screen, and the page has each joint's own.
+const MOST_JOINTS: usize = 6;
+
+/// The joints that a picture shows, and a remark in its title if these are not all.
+fn shown_joints(outcome: &Outcome) -> (Vec<Joint>, String) {
+    let joints = outcome.models.after.model.joints;
+    if !is_large(joints) {
+        return (Joint::all(joints).collect(), String::new());
+    }
+    let remark = format!(" (the {MOST_JOINTS} of {joints} joints with the largest error)");
+    (worst(&errors_of_joints(outcome), MOST_JOINTS), remark)
+}
+
+/// The `most` joints with the largest errors, in order. An error that is not a number is larger than all.
+fn worst(errors: &[f64], most: usize) -> Vec<Joint> {
+    let mut joints: Vec<Joint> = Joint::all(errors.len()).collect();
+    joints.sort_by(|a, b| errors[b.index()].total_cmp(&errors[a.index()]));
+    joints.truncate(most);
+    joints.sort_unstable();
+    joints
+}
+
+/// The error that was compared of the model with effects, joint by joint.
+fn errors_of_joints(outcome: &Outcome) -> Vec<f64> {
+    let torque = outcome.errors.torque.as_ref();
+    match torque.filter(|_| outcome.error_model == ErrorModel::InverseDynamics) {
+        Some(torque) => torque.after.rms.clone(),
+        None => {
+            let after = &outcome.errors.after;
+            let mut rmse =
+                summarise(&after.horizons, outcome.models.after.model.joints).position_rmse;
+            rmse.swap_remove(after.horizons.len() / 2)
+        }
+    }
+}
+
 /// What was compared on the beginning of the first test log: open-loop predictions of its motion, or the torques that it needs.
 pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
     let all = series(outcome);
@@ -33,9 +69,8 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
             tracks: shown.map_or_else(Vec::new, |one| tracks(outcome, one, joint)),
         }
     };
-    let panels: Vec<Panel> = Joint::all(outcome.models.after.model.joints)
-        .map(panel)
-        .collect();
+    let (joints, which) = shown_joints(outcome);
+    let panels: Vec<Panel> = joints.into_iter().map(panel).collect();
     let log = shown.map_or_else(|| "the test logs".to_owned(), |one| one.log.name());
     let about = match (outcome.error_model, outcome.predictions.longest.first()) {
         (ErrorModel::OutputError, Some(longest)) => format!(
@@ -45,7 +80,7 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
         (ErrorModel::OutputError, None) => "no predictions".to_owned(),
         (ErrorModel::InverseDynamics, _) => "torques that its motion needs".to_owned(),
     };
-    residyn_plot::predictions(&panels, &format!("{log}: {about}"))
+    residyn_plot::predictions(&panels, &format!("{log}: {about}{which}"))
 }
 
 /// The curves of a joint; predictions of motion restart with each window.
@@ -100,13 +135,10 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
             shape(Role::After, WITH_EFFECTS, joint, with_effects),
         ],
     };
-    let panels: Vec<ShapePanel> = Joint::all(outcome.models.after.model.joints)
-        .map(panel)
-        .collect();
-    residyn_plot::residual_shape(
-        &panels,
-        "Residual force: what each model leaves unexplained",
-    )
+    let (joints, which) = shown_joints(outcome);
+    let panels: Vec<ShapePanel> = joints.into_iter().map(panel).collect();
+    let title = format!("Residual force: what each model leaves unexplained{which}");
+    residyn_plot::residual_shape(&panels, &title)
 }
 
 fn shape(
@@ -185,4 +217,22 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
         .map(|(joint, h)| row(joint, h))
         .collect();
     residyn_plot::error_bars(&rows, title)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::worst;
+
+    #[test]
+    fn the_joints_with_the_largest_errors_are_shown_in_order() {
+        let shown = |errors: &[f64]| -> Vec<usize> {
+            worst(errors, 2)
+                .iter()
+                .map(|joint| joint.number())
+                .collect()
+        };
+        assert_eq!(shown(&[0.1, 0.4, 0.2, 0.3]), [2, 4]);
+        assert_eq!(shown(&[0.1, 0.4, f64::NAN, 0.3]), [2, 3]);
+        assert_eq!(shown(&[0.1]), [1]);
+    }
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::cli::gains::Gains;
-use crate::cli::terminal;
+use crate::cli::notes;
 use residyn_core::model::{Library, Model};
 use residyn_formats::{RobotReader, model_of, robot_reader};
 use residyn_io::files::write_whole;
@@ -81,9 +81,7 @@ impl Declared {
 
     fn made(robot: &Path, reader: &RobotReader, gains: &Gains, out: &Path) -> Result<Self> {
         let tree = gains.on(reader.tree(robot, None, None)?)?;
-        for note in &tree.notes {
-            terminal::say(format!("note: {note}"));
-        }
+        notes::say(&tree.notes);
         let model = model_of(&tree)?;
         Ok(Self {
             path: out.join(MADE),

@@ -79,6 +79,12 @@ impl Target {
             ));
         }
         assert!(all.faults.is_empty(), "{}", all.faults.join("\n"));
+        // The first inputs are the seeds: a target that refuses them all tests little of its reader.
+        assert!(
+            asked.is_some() || all.accepted > 0,
+            "{} accepts no input",
+            self.name
+        );
     }
 
     /// The input with this number. The first inputs are the seeds themselves.

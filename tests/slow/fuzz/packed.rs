@@ -42,7 +42,8 @@ pub fn npz(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
-/// A description of tensors, beside their numbers.
+/// A description of tensors, beside numbers that rise whether they are read as whole or as broken ones, in 4 bytes or in 8:
+/// those of positive numbers are in their order. Times must rise.
 pub fn pt(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     let mut add = |name: &str, contents: &[u8], times: usize| {
@@ -52,8 +53,11 @@ pub fn pt(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
         (0..times).for_each(|_| archive.write_all(contents).unwrap());
     };
     add("run/data.pkl", &input, times(rng));
+    let numbers: Vec<u8> = (0..400_u16)
+        .flat_map(|k| (0.004 * f32::from(k)).to_le_bytes())
+        .collect();
     for storage in ["run/data/0", "run/data/1", "run/data/2", "run/data/3"] {
-        add(storage, &[0; 1600], 1);
+        add(storage, &numbers, 1);
     }
     archive.finish().unwrap().into_inner()
 }

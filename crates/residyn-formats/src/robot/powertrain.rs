@@ -1,9 +1,11 @@
 //! What moves the joints of a model, as simulators represent it: drives that are linear up to a limit, and what a joint
 //! adds to its load.
 
-use super::servo::{Servo, servos};
+use super::servo::{Servo, servos, tangents};
 use super::value;
+use crate::export_model::reads;
 use crate::{ExportModel, ExportedEffect};
+use residyn_core::model::Parameter;
 use residyn_core::model::tree::{Drivetrain, Spring};
 
 /// The powertrains of a model, one a joint.
@@ -60,21 +62,8 @@ impl Powertrains {
         if model.depends_on_time() {
             return Err("its equations depend on time".into());
         }
-        let joints = drives(model)?.into_iter().map(|drive| Powertrain {
-            joint: Drivetrain::default(),
-            zero: 0.0,
-            drive,
-        });
-        let mut powertrains = Self {
-            joints: joints.collect(),
-            not_carried: Vec::new(),
-        };
-        // A constant torque acts behind limits and gains, wherever the file states it.
-        let is_constant = |effect: &&ExportedEffect| effect.name == "constant_torque";
-        let (constant, others): (Vec<_>, Vec<_>) = model.effects.iter().partition(is_constant);
-        for effect in others.into_iter().chain(constant) {
-            powertrains.carry(effect, model);
-        }
+        let parameters = &model.equations.parameters;
+        let mut powertrains = Self::behind(drives(model, parameters)?, model, parameters);
         let lost = &mut powertrains.not_carried;
         if model.residual.is_some() {
             lost.push("the network that learns what the equations lack".into());
@@ -83,14 +72,82 @@ impl Powertrains {
         Ok(powertrains)
     }
 
-    fn carry(&mut self, effect: &ExportedEffect, model: &ExportModel) {
+    /// The powertrains with one parameter that may move them after the other at the two ends of its interval, all others at their
+    /// values. Of a model that has powertrains.
+    pub fn at_ends(model: &ExportModel) -> Vec<[Vec<Powertrain>; 2]> {
         let parameters = &model.equations.parameters;
+        let declared = model.system.parameters.len();
+        let program = model.system.drive_program();
+        let moves = |k: usize| {
+            let input = 3 * model.joints() + 1 + k;
+            k >= declared
+                || program
+                    .as_ref()
+                    .is_some_and(|program| reads(program, input))
+        };
+        let at_end = |k: usize, end: f64| {
+            let mut moved = parameters.clone();
+            moved[k].value = end;
+            Self::behind(drives_near(model, &moved), model, &moved).joints
+        };
+        let at_ends = |(k, parameter): (usize, &Parameter)| {
+            let ends = parameter.ci95.filter(|_| moves(k))?;
+            let is_closed = ends.iter().all(|end| end.is_finite());
+            is_closed.then(|| ends.map(|end| at_end(k, end)))
+        };
+        parameters.iter().enumerate().filter_map(at_ends).collect()
+    }
+
+    /// Drives with the effects of a model, at these values.
+    fn behind(drives: Vec<Drive>, model: &ExportModel, parameters: &[Parameter]) -> Self {
+        let joints = drives.into_iter().map(|drive| Powertrain {
+            joint: Drivetrain::default(),
+            zero: 0.0,
+            drive,
+        });
+        let mut powertrains = Self {
+            joints: joints.collect(),
+            not_carried: Vec::new(),
+        };
+        // A constant torque acts behind limits and gains, wherever the file states it; other friction in each direction is one.
+        let constants = ["constant_torque", "asymmetric_friction"];
+        let is_constant = |effect: &&ExportedEffect| constants.contains(&effect.name.as_str());
+        let (constant, others): (Vec<_>, Vec<_>) = model.effects.iter().partition(is_constant);
+        for effect in others.into_iter().chain(constant) {
+            powertrains.carry(effect, model, parameters);
+        }
+        powertrains
+    }
+
+    fn carry(&mut self, effect: &ExportedEffect, model: &ExportModel, parameters: &[Parameter]) {
         let value = |name: &String| value(parameters, name).unwrap_or(0.0);
         let values: Vec<f64> = effect.parameters.iter().map(value).collect();
         let Powertrain { joint, zero, drive } = &mut self.joints[effect.joint.index()];
+        let lost = &mut self.not_carried;
+        let on = format!(
+            "{} on joint {}",
+            effect.name,
+            model.system.joint_label(effect.joint)
+        );
         match (effect.name.as_str(), &values[..]) {
             ("viscous_friction", [b]) => joint.damping += b,
             ("coulomb_friction", [level]) => joint.friction += level,
+            ("stribeck_friction", [level, ..]) => {
+                joint.friction += level;
+                lost.push(format!(
+                    "{on}: its excess near standstill; dry friction of {level:.4} is written"
+                ));
+            }
+            ("asymmetric_friction", [forward, backward, slope_forward, slope_backward]) => {
+                joint.friction += 0.5 * (forward + backward);
+                drive.add(0.5 * (backward - forward));
+                joint.damping += 0.5 * (slope_forward + slope_backward);
+                if slope_forward != slope_backward {
+                    lost.push(format!(
+                        "{on}: slopes that differ by direction; their mean is written"
+                    ));
+                }
+            }
             ("rotor_inertia", [inertia]) => joint.armature += inertia,
             ("joint_spring", [stiffness, rest]) => {
                 joint.spring = Some(Spring {
@@ -105,12 +162,7 @@ impl Powertrains {
             ("actuator_delay", [time]) => drive.delay = Some(*time).filter(|time| *time > 0.0),
             ("actuator_lag", [time]) => drive.lag = Some(*time),
             ("constant_torque", [torque]) => drive.add(*torque),
-            _ => self.not_carried.push(format!(
-                "{} on joint {}: {}",
-                effect.name,
-                model.system.joint_label(effect.joint),
-                effect.expression
-            )),
+            _ => lost.push(format!("{on}: {}", effect.expression)),
         }
     }
 }
@@ -167,11 +219,25 @@ impl Drive {
 }
 
 /// The drives of a model's joints, without effects.
-fn drives(model: &ExportModel) -> Result<Vec<Drive>, String> {
+fn drives(model: &ExportModel, parameters: &[Parameter]) -> Result<Vec<Drive>, String> {
     let Some(program) = model.system.drive_program() else {
         return Ok(vec![Drive::DIRECT; model.joints()]);
     };
-    let declared = &model.equations.values()[..model.system.parameters.len()];
-    let servos = servos(&program, model.joints(), declared)?;
+    let servos = servos(&program, model.joints(), &declared(model, parameters))?;
     Ok(servos.into_iter().map(Drive::of).collect())
+}
+
+/// The same at other values, known to have that form.
+fn drives_near(model: &ExportModel, parameters: &[Parameter]) -> Vec<Drive> {
+    let Some(program) = model.system.drive_program() else {
+        return vec![Drive::DIRECT; model.joints()];
+    };
+    let servos = tangents(&program, model.joints(), &declared(model, parameters));
+    servos.into_iter().map(Drive::of).collect()
+}
+
+/// Values of the parameters that the file declares, those of effects aside.
+fn declared(model: &ExportModel, parameters: &[Parameter]) -> Vec<f64> {
+    let declared = parameters.iter().take(model.system.parameters.len());
+    declared.map(|parameter| parameter.value).collect()
 }

@@ -34,19 +34,28 @@ pub(super) fn servos(
     joints: usize,
     values: &[f64],
 ) -> Result<Vec<Servo>, String> {
-    let torques = |moving: &[f64]| program.eval(&[moving, &[0.0], values].concat());
-    let servo = |joint: Joint| {
+    let found = tangents(program, joints, values).into_iter();
+    let check = |(joint, servo): (Joint, Servo)| {
         let j = joint.index();
-        let torque = |moving: &[f64]| torques(moving)[j];
-        let servo = Servo::through(&torque, joints, j);
-        let is_same = servo.is_same(&torque, joints, j);
+        let is_same = servo.is_same(&torque(program, values, j), joints, j);
         is_same.then_some(servo).ok_or_else(|| {
             format!(
                 "the drive of joint {joint} is not a linear function of its command and its joint's motion, up to a limit"
             )
         })
     };
-    Joint::all(joints).map(servo).collect()
+    Joint::all(joints).zip(found).map(check).collect()
+}
+
+/// The forms through single values of the torques of such a program, whether or not the drives have that form elsewhere.
+pub(super) fn tangents(program: &Program, joints: usize, values: &[f64]) -> Vec<Servo> {
+    let through = |j| Servo::through(&torque(program, values, j), joints, j);
+    (0..joints).map(through).collect()
+}
+
+/// The torque of joint `j` by positions, velocities and commands.
+fn torque(program: &Program, values: &[f64], j: usize) -> impl Fn(&[f64]) -> f64 {
+    move |moving| program.eval(&[moving, &[0.0], values].concat())[j]
 }
 
 impl Servo {

@@ -12,6 +12,7 @@ mod made;
 mod missing;
 mod next;
 mod overview;
+mod tried;
 mod trust;
 
 use maud::Markup;

@@ -4,12 +4,13 @@ use super::bodies::bodies;
 use super::calibration::calibration;
 use super::left::left;
 use super::logs::by_log;
-use super::{Block, Cell, better, cell, cells, folded, folded_if_large, heading, paragraph, table};
+use super::tried::tried;
+use super::{Block, Cell, better, cell, folded, folded_if_large, heading, paragraph, table};
 use crate::schema::{
     AlternativeEntry, AuditEntry, ContradictedEntry, FitEntry, IdentifiabilityEntry, RefittedEntry,
-    Report, TriedEntry,
+    Report,
 };
-use crate::wording::{FITTED, WITH_EFFECTS, amount, listed, reduction, small};
+use crate::wording::{FITTED, WITH_EFFECTS, amount, listed, small};
 use residyn_core::data::{Finding, Severity, Together, together};
 
 pub(super) fn answer(report: &Report) -> Vec<Block> {
@@ -45,36 +46,6 @@ fn alternatives(report: &Report) -> Vec<Block> {
     );
     let rivals = folded_if_large(report, &about, vec![rivals]);
     [vec![heading("Other explanations")], rivals].concat()
-}
-
-/// The sets of effects that were fitted, round by round.
-fn tried(report: &Report) -> Block {
-    let about = paragraph("Gain: relative drop of the loss on blocks held out of the fit.");
-    let rounds = report.tried.iter().zip(&report.candidates).zip(1..);
-    let rounds = rounds.flat_map(|((tried, candidates), number)| round(number, *candidates, tried));
-    let blocks = [about].into_iter().chain(rounds);
-    folded("What was tried", blocks.collect())
-}
-
-fn round(number: usize, candidates: usize, tried: &[TriedEntry]) -> Vec<Block> {
-    let round = format!("Round {number} ({candidates} candidates");
-    if tried.is_empty() {
-        let none = "no set came near the loss that the round began with.";
-        return vec![paragraph(format!("{round}): {none}"))];
-    }
-    let row = |tried: &TriedEntry| {
-        let effects: Vec<&str> = tried.effects.iter().map(|e| e.label.as_str()).collect();
-        let chosen = if tried.chosen { "chosen" } else { "" };
-        cells([
-            effects.join(", "),
-            reduction(tried.gain, "loss"),
-            chosen.to_owned(),
-        ])
-    };
-    vec![
-        paragraph(format!("{round}; the most promising sets were fitted):")),
-        table(1, ["effects", "gain", ""], tried.iter().map(row)),
-    ]
 }
 
 /// More parameters than this are folded away.

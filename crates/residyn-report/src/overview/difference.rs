@@ -30,6 +30,10 @@ pub(crate) struct DifferenceEntry {
     pub of_others: f64,
 }
 
+/// Smaller differences, as a share of the larger value, are not worth a word: friction repeats no better from day to day, and
+/// what a model leaves out moves values of equal joints by some hundredths, beyond intervals that know of noise alone.
+const LEAST: f64 = 0.1;
+
 impl DifferenceEntry {
     pub fn side(&self) -> Side {
         match self.value > self.of_others {
@@ -86,6 +90,7 @@ struct Known {
 pub(crate) fn differences(like: &[Vec<Joint>], all: &[OwnValues]) -> Vec<DifferenceEntry> {
     let mut found: Vec<DifferenceEntry> =
         like.iter().flat_map(|group| within(group, all)).collect();
+    found.retain(|one| one.share() > LEAST);
     found.sort_by(|a, b| b.share().total_cmp(&a.share()));
     found
 }
@@ -195,8 +200,10 @@ fn contrasts_of(mut values: Vec<Known>) -> Vec<[Vec<Known>; 2]> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Known, contrasts_of, times};
+    use super::{Known, contrasts_of, differences, times};
+    use crate::overview::OwnValues;
     use residyn_core::data::Joint;
+    use residyn_core::model::Parameter;
 
     /// Which joints differ from which, given values with the half widths of their intervals.
     fn differ(values: &[[f64; 2]]) -> Vec<[Vec<usize>; 2]> {
@@ -231,6 +238,34 @@ mod tests {
         let pairs = [[1.0, 0.1], [2.0, 0.1], [1.05, 0.1], [2.05, 0.1]];
         assert_eq!(differ(&pairs), [[vec![2, 4], vec![1, 3]]]);
         assert!(differ(&[[1.0, 0.1]]).is_empty() && differ(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_difference_of_a_few_per_cent_is_none() {
+        let friction = |(k, value): (usize, &f64)| OwnValues {
+            of: "coulomb_friction".to_owned(),
+            joints: vec![Joint::at(k)],
+            parameters: vec![Parameter {
+                name: format!("F_c{}", k + 1),
+                value: *value,
+                unit: "N m".to_owned(),
+                bounds: [0.0, f64::INFINITY],
+                fixed: false,
+                per_log: false,
+                ci95: Some([0.999 * value, 1.001 * value]),
+                scale: 0.1,
+            }],
+            is_comparable: true,
+            related: Vec::new(),
+        };
+        let found = |values: [f64; 4]| {
+            let all: Vec<OwnValues> = values.iter().enumerate().map(friction).collect();
+            let like = [(0..4).map(Joint::at).collect()];
+            let found = differences(&like, &all).into_iter();
+            found.map(|one| one.joints).collect::<Vec<_>>()
+        };
+        assert!(found([0.25, 0.25, 0.257, 0.245]).is_empty());
+        assert_eq!(found([0.25, 0.25, 0.45, 0.257]), [[Joint::at(2)]]);
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub(crate) struct OwnValues {
     /// Whether like joints, some of them mirrored, would have the same values.
     pub is_comparable: bool,
     /// Effects that it contains or is confused with.
-    related: Vec<String>,
+    pub(super) related: Vec<String>,
 }
 
 impl OwnValues {
