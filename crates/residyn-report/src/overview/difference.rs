@@ -252,6 +252,7 @@ mod tests {
                 bounds: [0.0, f64::INFINITY],
                 fixed: false,
                 per_log: false,
+                per_group: false,
                 ci95: Some([0.999 * value, 1.001 * value]),
                 scale: 0.1,
             }],
