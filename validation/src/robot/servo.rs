@@ -6,8 +6,11 @@ use crate::bodies::Bodies;
 use crate::drive::Drive;
 use crate::hidden::Hidden;
 
-/// Length of a step \[s\]: halving it changes less than an encoder resolves (tested below).
+/// Length of a step \[s\]: halving it changes less than an encoder resolves (tested below). A step in which a joint with dry
+/// friction stops or turns back is taken in parts, down to the shortest.
 const STEP_S: f64 = 2.5e-4;
+const SHORTEST_S: f64 = 1e-5;
+const PARTS: u32 = 5;
 
 /// Friction of coupled joints is found one joint after the other, again and again, until no impulse changes by more than
 /// this \[N m s\].
@@ -76,12 +79,12 @@ pub(super) struct Rig {
     pub servos: Vec<Servo>,
 }
 
-/// Where its joints are, how fast they move, and how fast they did a step before.
+/// Where its joints are, how fast they move, and their accelerations in the step before.
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
     pub q: DVector<f64>,
     pub v: DVector<f64>,
-    before: DVector<f64>,
+    rate: DVector<f64>,
 }
 
 impl Motion {
@@ -90,7 +93,7 @@ impl Motion {
         Self {
             q: DVector::from_column_slice(q),
             v: zero.clone(),
-            before: zero,
+            rate: zero,
         }
     }
 }
@@ -110,10 +113,25 @@ impl Rig {
         }
     }
 
-    /// A step of this length \[s\] by the midpoint rule: what depends on angles and speeds is taken at its middle.
+    /// A step of this length \[s\].
     pub fn step(&self, motion: &mut Motion, targets: &[f64], h: f64) {
+        let next = self.after(motion, targets, h);
+        let turns = |(j, servo): (usize, &Servo)| {
+            servo.dry > 0.0 && motion.v[j] != 0.0 && motion.v[j] * next.v[j] <= 0.0
+        };
+        if h > SHORTEST_S && self.servos.iter().enumerate().any(turns) {
+            for _ in 0..PARTS {
+                self.step(motion, targets, h / f64::from(PARTS));
+            }
+        } else {
+            *motion = next;
+        }
+    }
+
+    /// A step by the midpoint rule: what depends on angles and speeds is taken at its middle.
+    fn after(&self, motion: &Motion, targets: &[f64], h: f64) -> Motion {
         let middle = &motion.q + &motion.v * (0.5 * h);
-        let ahead = &motion.v + (&motion.v - &motion.before) * 0.5;
+        let ahead = &motion.v + &motion.rate * (0.5 * h);
         let posed = self.bodies.at(middle.as_slice());
         let zero = vec![0.0; self.servos.len()];
         let mut free = -DVector::from_vec(posed.torques(ahead.as_slice(), &zero));
@@ -142,8 +160,11 @@ impl Rig {
                 break;
             }
         }
-        motion.q = middle + &after * (0.5 * h);
-        motion.before = std::mem::replace(&mut motion.v, after);
+        Motion {
+            q: middle + &after * (0.5 * h),
+            rate: (&after - &motion.v) / h,
+            v: after,
+        }
     }
 }
 
