@@ -105,12 +105,11 @@ impl<'l> Done<'l> {
 
     /// Each named effect, and whether it is hidden on its joint.
     pub fn named(&self) -> impl Iterator<Item = (Label, bool)> {
-        let named = self.findings.into_iter().flat_map(|f| {
+        self.findings.into_iter().flat_map(|f| {
             let is_hidden = |label: &Label| !f.judgement.wrong.contains(label);
             let labels = f.answer.named.iter().map(|named| named.label.clone());
             labels.map(move |label| (label.clone(), is_hidden(&label)))
-        });
-        named
+        })
     }
 
     pub fn is_told(&self) -> bool {
