@@ -8,12 +8,10 @@ use super::{Hides, Robot, at};
 use crate::hidden::Hidden;
 use residyn_core::data::Joint;
 
-/// Friction as a share of the root-mean-square torque that the loop of a joint asks for, or of a twentieth of the
-/// strongest joint's if that is more.
-const FRICTION: [f64; 2] = [0.08, 0.3];
+/// Torques of friction and of a rotor at typical speeds and accelerations, as shares of the root-mean-square torque that the
+/// loop of a joint asks for, or of a twentieth of the strongest joint's if that is more.
+const SHARES: [f64; 2] = [0.08, 0.3];
 const LEAST: f64 = 0.05;
-/// Inertia of a rotor as a share of what its joint moves.
-const ROTOR: [f64; 2] = [0.2, 0.8];
 /// Joints that are built alike differ by up to this share.
 const SPREAD: f64 = 0.03;
 /// How many times the friction of its like a worn joint has.
@@ -36,14 +34,14 @@ const STEP_S: f64 = 2e-3;
 /// What is typical of a joint.
 #[derive(Debug, Clone, Default)]
 struct Typical {
-    /// Root mean squares of the torque that the loop asks for \[N m\], of gravity's \[N m\], and of the speed \[rad/s\].
+    /// Root mean squares of the torque that the loop asks for \[N m\], of gravity's \[N m\], of the speed \[rad/s\] and of
+    /// the acceleration \[rad/s^2\].
     torque: f64,
     weight: f64,
     speed: f64,
+    acceleration: f64,
     /// The largest torque \[N m\].
     peak: f64,
-    /// What it moves with the joints at zero \[kg m^2\].
-    inertia: f64,
     /// Whether another body carries it.
     is_carried: bool,
 }
@@ -103,7 +101,6 @@ impl Robot {
         let mut motion = Motion::at_rest(&at(&targets, 0.0));
         let joints = rig.servos.len();
         let zero = vec![0.0; joints];
-        let mass = rig.bodies.at(&zero).mass();
         let mut all = vec![Typical::default(); joints];
         let mut time = 0.0;
         while time < SECONDS {
@@ -115,6 +112,7 @@ impl Robot {
                 of.torque += share * torque.powi(2);
                 of.weight += share * weight[j].powi(2);
                 of.speed += share * motion.v[j].powi(2);
+                of.acceleration += share * motion.rate[j].powi(2);
                 of.peak = of.peak.max(torque.abs());
             }
             rig.step(&mut motion, &wanted, STEP_S);
@@ -123,8 +121,9 @@ impl Robot {
         let strongest = all.iter().map(|of| of.torque.sqrt()).fold(0.0, f64::max);
         for (j, of) in all.iter_mut().enumerate() {
             of.torque = of.torque.sqrt().max(LEAST * strongest);
-            (of.weight, of.speed) = (of.weight.sqrt(), of.speed.sqrt());
-            of.inertia = mass[(j, j)];
+            for square in [&mut of.weight, &mut of.speed, &mut of.acceleration] {
+                *square = square.sqrt();
+            }
             of.is_carried = rig.bodies.is_carried(j);
         }
         all
@@ -167,7 +166,7 @@ fn alike(
 
 fn dry(set: &[Joint], typical: &[Typical], rng: &mut impl Rng) -> Vec<Hidden> {
     let level = mean(set, |joint| typical[joint].torque);
-    let level = level * rng.random_range(FRICTION[0]..FRICTION[1]);
+    let level = level * rng.random_range(SHARES[0]..SHARES[1]);
     alike("coulomb_friction", "F_c", level, set, rng)
 }
 
@@ -181,15 +180,17 @@ fn of_drivetrain(set: &[Joint], typical: &[Typical], rng: &mut impl Rng) -> Vec<
     }
     if without != 1 {
         let slope = mean(set, |joint| typical[joint].torque / typical[joint].speed);
-        let slope = slope * rng.random_range(FRICTION[0]..FRICTION[1]);
+        let slope = slope * rng.random_range(SHARES[0]..SHARES[1]);
         effects.extend(alike("viscous_friction", "b", slope, set, rng));
     }
     let carried: Vec<Joint> = (set.iter().copied())
         .filter(|joint| typical[*joint].is_carried)
         .collect();
     if without != 2 && !carried.is_empty() {
-        let inertia = mean(set, |joint| typical[joint].inertia);
-        let inertia = inertia * rng.random_range(ROTOR[0]..ROTOR[1]);
+        let inertia = mean(set, |joint| {
+            typical[joint].torque / typical[joint].acceleration
+        });
+        let inertia = inertia * rng.random_range(SHARES[0]..SHARES[1]);
         effects.extend(alike("rotor_inertia", "J", inertia, &carried, rng));
     }
     effects

@@ -84,7 +84,7 @@ pub(super) struct Rig {
 pub(super) struct Motion {
     pub q: DVector<f64>,
     pub v: DVector<f64>,
-    rate: DVector<f64>,
+    pub rate: DVector<f64>,
 }
 
 impl Motion {
