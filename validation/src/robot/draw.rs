@@ -12,6 +12,8 @@ use residyn_core::data::Joint;
 /// loop of a joint asks for, or of a twentieth of the strongest joint's if that is more.
 const SHARES: [f64; 2] = [0.08, 0.3];
 const LEAST: f64 = 0.05;
+/// Inertia of a rotor as a share of what its joint moves, if that is more: less could as well be an error of the bodies.
+const ROTOR: [f64; 2] = [0.3, 0.8];
 /// Joints that are built alike differ by up to this share.
 const SPREAD: f64 = 0.03;
 /// How many times the friction of its like a worn joint has.
@@ -40,6 +42,8 @@ struct Typical {
     weight: f64,
     speed: f64,
     acceleration: f64,
+    /// What it moves with the joints at zero \[kg m^2\].
+    inertia: f64,
     /// The largest torque \[N m\].
     peak: f64,
     /// Whether another body carries it.
@@ -101,6 +105,7 @@ impl Robot {
         let mut motion = Motion::at_rest(&at(&targets, 0.0));
         let joints = rig.servos.len();
         let zero = vec![0.0; joints];
+        let mass = rig.bodies.at(&zero).mass();
         let mut all = vec![Typical::default(); joints];
         let mut time = 0.0;
         while time < SECONDS {
@@ -124,6 +129,7 @@ impl Robot {
             for square in [&mut of.weight, &mut of.speed, &mut of.acceleration] {
                 *square = square.sqrt();
             }
+            of.inertia = mass[(j, j)];
             of.is_carried = rig.bodies.is_carried(j);
         }
         all
@@ -187,10 +193,12 @@ fn of_drivetrain(set: &[Joint], typical: &[Typical], rng: &mut impl Rng) -> Vec<
         .filter(|joint| typical[*joint].is_carried)
         .collect();
     if without != 2 && !carried.is_empty() {
+        let by_torque = rng.random_range(SHARES[0]..SHARES[1]);
+        let by_inertia = rng.random_range(ROTOR[0]..ROTOR[1]);
         let inertia = mean(set, |joint| {
-            typical[joint].torque / typical[joint].acceleration
+            let of = &typical[joint];
+            (by_torque * of.torque / of.acceleration).max(by_inertia * of.inertia)
         });
-        let inertia = inertia * rng.random_range(SHARES[0]..SHARES[1]);
         effects.extend(alike("rotor_inertia", "J", inertia, &carried, rng));
     }
     effects
