@@ -1,15 +1,18 @@
 //! The bench: its hand-written rigs against the equations of the model files, and a small grid end to end.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use residyn::read_model;
-use residyn_core::data::Log;
+use residyn_core::data::{Joint, Log};
 use residyn_core::model::{FittedEffect, Library};
 use residyn_core::sim::metric::assess;
 use residyn_io::write_log;
-use residyn_validation::{Cell, Group, Hidden, Mechanics, Source, Truth, read, recorded};
+use residyn_validation::{
+    Build, Cell, Flaws, Group, Hidden, Hides, Mechanics, Source, Truth, read, recorded,
+};
 
 use crate::support::paths::configs;
 use crate::support::tables::rows;
@@ -114,6 +117,69 @@ fn drawn(grid: &str, id: &str) -> (Cell, Vec<Log>, Truth) {
     let cell = cell.settled(&library).unwrap();
     let (logs, truth) = cell.record(&cell.declared(&library).unwrap()).unwrap();
     (cell, logs, truth)
+}
+
+/// The kind and the build of a robot's cell.
+fn of_robot(cell: &Cell) -> (Hides, &Build) {
+    match &cell.source {
+        Source::Robot(robot) => (robot.hides, &robot.build),
+        _ => panic!("{}: not a robot", cell.id),
+    }
+}
+
+/// The number of an effect on a joint, if it is hidden there.
+fn number(cell: &Cell, name: &str, joint: Joint) -> Option<f64> {
+    let mut own = cell.effects.iter();
+    let own = own.find(|effect| effect.name == name && effect.joint == joint)?;
+    own.values.values().next().copied()
+}
+
+/// What only one kind of robot hides.
+const OF_ONE_KIND: [(Hides, &str); 3] = [
+    (Hides::Gains, "actuator_gain"),
+    (Hides::Limits, "actuator_saturation"),
+    (Hides::Zeros, "sensor_offset"),
+];
+
+#[test]
+fn robots_hide_what_their_kind_says_on_joints_that_can_have_it() {
+    let library = Library::built_in();
+    let cells = read(&path("robots.toml")).unwrap();
+    let first = cells.iter().filter(|cell| cell.id.ends_with("/1"));
+    for cell in first.map(|cell| cell.settled(&library).unwrap()) {
+        let (hides, build) = of_robot(&cell);
+        let joints: Vec<Joint> = Joint::all(build.targets.len()).collect();
+        assert_eq!(cell.effects.is_empty(), hides == Hides::Nothing);
+        let labels: BTreeSet<String> = cell.effects.iter().map(Hidden::label).collect();
+        assert_eq!(labels.len(), cell.effects.len(), "{}", cell.id);
+        for (kind, name) in OF_ONE_KIND {
+            let found = cell.effects.iter().any(|effect| effect.name == name);
+            assert_eq!(found, kind == hides, "{}: {name}", cell.id);
+        }
+        let delays = joints
+            .iter()
+            .map(|joint| number(&cell, "actuator_delay", *joint));
+        let delays: Vec<Option<f64>> = delays.collect();
+        assert!(delays.windows(2).all(|two| two[0] == two[1]), "{delays:?}");
+        let spread = |name: &str, set: &[Joint]| {
+            let found = set.iter().filter_map(|joint| number(&cell, name, *joint));
+            let found: Vec<f64> = found.collect();
+            assert!(found.is_empty() || found.len() == set.len(), "{}", cell.id);
+            let most = found.iter().copied().fold(f64::MIN, f64::max);
+            (!found.is_empty()).then(|| most / found.iter().copied().fold(f64::MAX, f64::min))
+        };
+        let spreads = |name| build.like.iter().filter_map(move |set| spread(name, set));
+        let worn = spreads("coulomb_friction").filter(|spread| *spread > 1.7);
+        assert_eq!(
+            worn.count(),
+            usize::from(hides == Hides::Worn),
+            "{}",
+            cell.id
+        );
+        for name in ["viscous_friction", "rotor_inertia"] {
+            assert!(spreads(name).all(|spread| spread < 1.07), "{}", cell.id);
+        }
+    }
 }
 
 #[test]
@@ -268,6 +334,44 @@ mod slow {
                 assert!((0.2..=5.0).contains(&off), "{}: {off}", parameter.name);
                 assert_ne!(off, 1.0);
             }
+        }
+    }
+
+    #[test]
+    fn a_robot_moves_as_its_model_with_what_it_hides() {
+        let library = Library::built_in();
+        let cells = read(&path("robots.toml")).unwrap();
+        for id in [
+            "robot/leg/limits/1",
+            "robot/arm/gains/1",
+            "robot/quadruped/worn/1",
+            "robot/torso/zeros/1",
+        ] {
+            let mut cell = cells.iter().find(|cell| cell.id == id).unwrap().clone();
+            let Source::Robot(robot) = &mut cell.source else {
+                panic!("{id}: not a robot")
+            };
+            let build = &mut robot.build;
+            (build.bodies, build.noise, build.quantum) = ([0.0; 2], 0.0, 0.0);
+            (build.logs, build.seconds) = (2, 3.0);
+            robot.flaws = Flaws::default();
+            let cell = cell.settled(&library).unwrap();
+            assert_eq!(cell, cell.settled(&library).unwrap(), "{id}: drawn anew");
+            let model = cell.declared(&library).unwrap();
+            let (logs, _) = cell.record(&model).unwrap();
+            assert_eq!(logs, cell.record(&model).unwrap().0, "{id}: recorded anew");
+            let error = |effects: &[FittedEffect]| {
+                let rig = model.with_effects(effects.to_vec());
+                let rig = rig.with_smoothing_velocities(vec![1e-3; model.joints]);
+                assess(&rig.dynamics(), &logs, &[0.5]).position_rms()
+            };
+            let effects = cell.effects.iter().map(|hidden| known(&library, hidden));
+            let effects: Option<Vec<FittedEffect>> = effects.collect();
+            let (with, without) = (error(&effects.unwrap()), error(&[]));
+            assert!(
+                with < 1e-3 && with < 0.02 * without,
+                "{id}: {with} rad with it, {without} without"
+            );
         }
     }
 

@@ -92,6 +92,12 @@ impl Cell {
                     ..self.clone()
                 });
             }
+            Source::Robot(robot) => {
+                return Ok(Self {
+                    effects: robot.hidden(&read_model(&self.model, library)?, &mut rng)?,
+                    ..self.clone()
+                });
+            }
             Source::Simulated(_) | Source::Files { .. } => return Ok(self.clone()),
         };
         let model = read_model(&self.model, library)?;
@@ -109,6 +115,7 @@ impl Cell {
             Source::Simulated(simulation) => Some(simulation.mechanics.joints()),
             Source::Drawn(recipe) => Some(recipe.mechanics.joints()),
             Source::Arm(arm) => Some(arm.amplitude.len()),
+            Source::Robot(robot) => Some(robot.build.targets.len()),
             Source::Files { .. } => None,
         }
     }
@@ -157,6 +164,11 @@ impl Cell {
                 let logs = logs.map_err(|message| anyhow!("{}: {message}", self.id))?;
                 Ok((logs, Truth::of(&self.effects, BTreeMap::new(), &[])))
             }
+            Source::Robot(robot) => {
+                let logs = robot.record(model, &self.effects, &mut self.rng())?;
+                let zeros = vec![self.zeros(model.joints); logs.len()];
+                Ok((logs, Truth::of(&self.effects, BTreeMap::new(), &zeros)))
+            }
             Source::Drawn(_) => Err(anyhow!("{}: its rig has not been drawn", self.id)),
         }
     }
@@ -169,7 +181,8 @@ impl Cell {
         let offsets: Vec<Pair> = (0..condition.logs)
             .map(|_| self.draw_offset(&mut rng))
             .collect();
-        let truth = Truth::of(hidden, machine.declared(), &offsets);
+        let of_joints: Vec<Vec<f64>> = offsets.iter().map(|offset| offset.to_vec()).collect();
+        let truth = Truth::of(hidden, machine.declared(), &of_joints);
         let record = |(index, offset): (usize, &Pair)| {
             machine.record(driving, condition, index, *offset, &mut rng)
         };
@@ -200,6 +213,16 @@ impl Cell {
         rng(content_hash(self.id.as_bytes()))
     }
 
+    /// How far each sensor of a robot is off, in all of its logs \[rad\].
+    fn zeros(&self, joints: usize) -> Vec<f64> {
+        let mut zeros = vec![0.0; joints];
+        let of_sensors = self.effects.iter();
+        for effect in of_sensors.filter(|effect| effect.name == "sensor_offset") {
+            zeros[effect.joint] = effect.values["q_z"];
+        }
+        zeros
+    }
+
     fn draw_offset(&self, rng: &mut impl Rng) -> Pair {
         let mut offset = [0.0; 2];
         for effect in &self.effects {
@@ -220,9 +243,9 @@ impl Cell {
         let split = last_is_test(logs);
         let settings = Settings::default();
         let (effects, known) = (&self.hidden(&model), &truth.declared);
-        // Arms are compared by torques, which this fit does not handle.
+        // Rigs of many joints are compared by torques, which this fit does not handle.
         let message = match self.source {
-            Source::Arm(_) => None,
+            Source::Arm(_) | Source::Robot(_) => None,
             _ => Told::fit(&model, library, &split, &settings, effects, known),
         };
         if self.group == Group::Told {

@@ -12,6 +12,8 @@ use super::draw::{Recipe, Rules};
 use super::hidden::Hidden;
 use super::machine::Machine;
 use super::mechanics::Mechanics;
+use super::robot::{Build, Hides, Robot};
+use super::sensors::Flaws;
 use residyn_core::limits::{CELLS, check_readings};
 use residyn_core::toml_text::from_toml;
 use residyn_io::files::{beside_or_named, read_text};
@@ -38,6 +40,8 @@ pub enum Group {
     Pair,
     /// Two to five are missing in a rig drawn by chance and all have to be named.
     Several,
+    /// Two or three are missing on each of many joints, and count joint by joint.
+    Joints,
     /// As above, but the program is told which, and its intervals have to hold the truth.
     Told,
     /// Nothing is missing, as the model declares all effects of the rig, and nothing may be named.
@@ -98,6 +102,24 @@ struct Arms {
     column: Column,
 }
 
+/// Position-controlled robots, which hide one kind of thing after the other.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Robots {
+    /// The part of a cell's name before what it hides and the number.
+    name: String,
+    /// A model file, relative to the grid.
+    model: PathBuf,
+    /// The model file whose first bodies the robots have, if the first does not show its own.
+    machine: Option<PathBuf>,
+    hides: Vec<Hides>,
+    /// First and last number of the cells of each kind.
+    numbers: [u64; 2],
+    build: Build,
+    /// Of the logs of a robot: the next robot, and the next kind's first, have the next ones.
+    flaws: Vec<Flaws>,
+}
+
 /// Every set of effects under every condition with every seed.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -124,6 +146,8 @@ struct File {
     draws: Vec<Draws>,
     #[serde(default)]
     arms: Vec<Arms>,
+    #[serde(default)]
+    robots: Vec<Robots>,
 }
 
 /// One test: a rig with its effects, how its logs are taken, and a seed.
@@ -163,6 +187,8 @@ pub enum Source {
     Drawn(Box<Recipe>),
     /// An arm, whose effects are drawn on demand.
     Arm(Box<Arm>),
+    /// A robot under position control, whose effects are drawn on demand.
+    Robot(Box<Robot>),
     /// Recorded by another program.
     Files {
         logs: Vec<PathBuf>,
@@ -204,6 +230,7 @@ pub fn cells(path: &Path, text: &str) -> Result<Vec<Cell>, GridError> {
         all.extend(drawn.map_err(|message| wrong(format!("draws {}: {message}", draws.name)))?);
     }
     all.extend(file.arms.iter().flat_map(|arms| arms.cells(path)));
+    all.extend(file.robots.iter().flat_map(|robots| robots.cells(path)));
     let mut ids: Vec<&str> = all.iter().map(|cell| cell.id.as_str()).collect();
     ids.sort_unstable();
     match ids.windows(2).find(|two| two[0] == two[1]) {
@@ -246,6 +273,10 @@ impl File {
             let checked = check_rows(arms.rate_hz, &arms.seconds);
             checked.map_err(|message| format!("arms {}: {message}", arms.name))?;
         }
+        for robots in &self.robots {
+            let checked = robots.check();
+            checked.map_err(|message| format!("robots {}: {message}", robots.name))?;
+        }
         match self.count() {
             0..=CELLS => Ok(()),
             found => Err(format!("has {found} cells; at most {CELLS} are run")),
@@ -271,9 +302,14 @@ impl File {
             .arms
             .iter()
             .map(|arms| all(&[arms.lacks.len(), numbered(arms.numbers)]));
+        let robots = self
+            .robots
+            .iter()
+            .map(|robots| all(&[robots.hides.len(), numbered(robots.numbers)]));
         series
             .chain(draws)
             .chain(arms)
+            .chain(robots)
             .fold(0, usize::saturating_add)
     }
 
@@ -379,6 +415,48 @@ impl Arms {
         let of_kind = |lacks: &Lacks| (first..=last).map(|number| cell(*lacks, number)).collect();
         let all: Vec<Vec<Cell>> = self.lacks.iter().map(of_kind).collect();
         all.concat()
+    }
+}
+
+impl Robots {
+    fn check(&self) -> Result<(), String> {
+        if self.flaws.is_empty() {
+            return Err("needs `flaws`, at least one set".to_owned());
+        }
+        self.flaws.iter().try_for_each(Flaws::check)?;
+        self.build.check()
+    }
+
+    fn cells(&self, path: &Path) -> Vec<Cell> {
+        let [first, last] = self.numbers;
+        let machine = self.machine.as_ref().unwrap_or(&self.model);
+        let cell = |hides: Hides, number: u64, place: usize| Cell {
+            id: format!("{}/{}/{number}", self.name, hides.name()),
+            group: match hides {
+                Hides::Nothing => Group::None,
+                _ => Group::Joints,
+            },
+            plant: self.name.clone(),
+            condition: hides.name().to_owned(),
+            effects: Vec::new(),
+            seed: number,
+            model: beside_or_named(path, &self.model),
+            start: BTreeMap::new(),
+            source: Source::Robot(Box::new(Robot {
+                hides,
+                machine: beside_or_named(path, machine),
+                build: self.build.clone(),
+                flaws: self.flaws[place % self.flaws.len()].clone(),
+            })),
+        };
+        let kinds = self.hides.iter().enumerate();
+        let of_kind = |(k, hides): (usize, &Hides)| -> Vec<Cell> {
+            let numbered = (first..=last).zip(k..);
+            numbered
+                .map(|(number, place)| cell(*hides, number, place))
+                .collect()
+        };
+        kinds.flat_map(of_kind).collect()
     }
 }
 

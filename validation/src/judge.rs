@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use super::coverage::{Coverage, coverage};
 use super::grid::Group;
 use super::hidden::{Hidden, Label};
-use super::mechanics::Pair;
 use super::recording::log_name;
 use residyn_core::closeloop::Verdict;
 
@@ -81,7 +80,7 @@ pub struct Judgement {
     /// Effects that were named, are absent, and reduce the error by less than half.
     pub weak: Vec<Label>,
     /// Coverage of the parameters of true effects that were named, as `label.name`, and of declared parameters, by
-    /// their names.
+    /// their names; of many joints, of those whose effects are named, and nothing else, if not all are.
     pub coverage: Vec<Coverage>,
     /// The cell meets the criterion of its group.
     pub passed: bool,
@@ -97,18 +96,19 @@ pub fn of_log(parameter: &str, log: &str) -> String {
 }
 
 /// An effect's numbers; for an offset, its value in each log.
-fn values(effect: &Hidden, offsets: &[Pair]) -> BTreeMap<String, f64> {
+fn values(effect: &Hidden, offsets: &[Vec<f64>]) -> BTreeMap<String, f64> {
     if effect.name != "sensor_offset" {
         return effect.values.clone();
     }
-    let in_log = |(k, offset): (usize, &Pair)| (of_log("q_z", &log_name(k)), offset[effect.joint]);
+    let in_log =
+        |(k, offset): (usize, &Vec<f64>)| (of_log("q_z", &log_name(k)), offset[effect.joint]);
     offsets.iter().enumerate().map(in_log).collect()
 }
 
 impl Truth {
     /// The truth about a rig with these effects and `declared` parameters, whose encoders read high by `offsets` rad,
     /// `[log][joint]`.
-    pub fn of(effects: &[Hidden], declared: BTreeMap<String, f64>, offsets: &[Pair]) -> Self {
+    pub fn of(effects: &[Hidden], declared: BTreeMap<String, f64>, offsets: &[Vec<f64>]) -> Self {
         Self {
             effects: effects
                 .iter()
@@ -159,23 +159,39 @@ pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
         .filter(|label| wrong.contains(label))
         .collect();
     let passed = match group {
-        Group::Single | Group::Pair | Group::Several | Group::Told | Group::Repeated => exact,
+        Group::Single
+        | Group::Pair
+        | Group::Several
+        | Group::Joints
+        | Group::Told
+        | Group::Repeated => exact,
         Group::None => named.is_empty() && !flagged,
         Group::Outside => flagged && weak.is_empty(),
     };
     Judgement {
         exact,
         within,
-        wrong,
-        missed,
         flagged,
         weak,
-        coverage: match exact {
-            true => coverage(truth, &answer.estimates(), &answer.declared),
-            false => Vec::new(),
+        coverage: match (exact, group) {
+            (true, _) => coverage(truth, &answer.estimates(), &answer.declared),
+            (false, Group::Joints) => {
+                let off: Vec<&str> = wrong.iter().chain(&missed).map(of_joint).collect();
+                let mut right = answer.estimates();
+                right.retain(|(label, _)| !off.contains(&of_joint(label)));
+                coverage(truth, &right, &[])
+            }
+            (false, _) => Vec::new(),
         },
+        wrong,
+        missed,
         passed,
     }
+}
+
+/// The joint in a label.
+fn of_joint(label: &Label) -> &str {
+    label.rsplit('@').next().unwrap_or_default()
 }
 
 /// The labels of `a` that are not in `b`.
@@ -329,13 +345,31 @@ mod tests {
     }
 
     #[test]
+    fn the_intervals_of_many_joints_are_checked_where_all_names_are_right() {
+        let hidden: [(&str, &[(&str, f64)]); 3] = [
+            ("coulomb_friction@1", &[("F_c", 0.1)]),
+            ("coulomb_friction@2", &[("F_c", 0.1)]),
+            ("rotor_inertia@2", &[("J", 0.01)]),
+        ];
+        let level = [("F_c", 0.11, [0.09, 0.13])];
+        let names = ["coulomb_friction@1", "coulomb_friction@2"];
+        let found = names.map(|name| named(name, &level, 0.9)).to_vec();
+        let answer = answer(Verdict::Explained, found, &[]);
+        let covered = |group| judge(group, &truth(&hidden), &answer).coverage;
+        assert_eq!(covered(Group::Several), []);
+        let covered = covered(Group::Joints);
+        let names: Vec<&str> = covered.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["coulomb_friction@1.F_c"]);
+    }
+
+    #[test]
     fn sensor_offsets_are_judged_per_log() {
         let hidden = Hidden {
             name: "sensor_offset".to_owned(),
             joint: Joint::at(1),
             values: [("q_z".to_owned(), 0.1)].into(),
         };
-        let values = values(&hidden, &[[0.0, 0.05], [0.0, -0.02]]);
+        let values = values(&hidden, &[vec![0.0, 0.05], vec![0.0, -0.02]]);
         let found = values.iter().map(|(name, value)| (name.as_str(), *value));
         let found: Vec<(&str, f64)> = found.collect();
         assert_eq!(found, [("q_z[log1.csv]", 0.05), ("q_z[log2.csv]", -0.02)]);

@@ -6,6 +6,7 @@
 
 mod answer;
 mod arm;
+mod bodies;
 mod cell;
 mod condition;
 mod coverage;
@@ -24,6 +25,7 @@ mod motion;
 mod presliding;
 mod recording;
 pub mod rigs;
+mod robot;
 mod rows;
 mod sensors;
 mod table;
@@ -41,6 +43,7 @@ pub use hidden::{Hidden, Label};
 pub use judge::{Answer, Estimate, Judgement, Named, Truth, judge};
 pub use machine::{Machine, State};
 pub use mechanics::{Mechanics, Pair};
+pub use robot::{Build, Hides, Robot};
 pub use rows::{Rate, Row};
 pub use sensors::Flaws;
 pub use table::{Line, Summary, markdown, summarise};

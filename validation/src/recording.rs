@@ -12,7 +12,7 @@ use super::wires::Wires;
 use residyn_core::data::Log;
 
 /// Logs differ in how hard the rig is driven; with more than two logs, the last lies within the range of the others.
-const STRENGTHS: [f64; 6] = [1.2, 0.5, 0.8, 1.0, 0.7, 0.9];
+pub(super) const STRENGTHS: [f64; 6] = [1.2, 0.5, 0.8, 1.0, 0.7, 0.9];
 
 /// The source of the torque.
 enum Source {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::cell::{Findings, KnownStructure, Searched};
 use super::coverage::Coverage;
 use super::grid::{Cell, Group};
+use super::hidden::{Hidden, Label};
 use super::judge::Judgement;
 use super::table::Line;
 use residyn_core::data::statistics::wilson;
@@ -93,6 +94,24 @@ impl<'l> Done<'l> {
         named.or(message).map_or(&[], Vec::as_slice)
     }
 
+    /// Each hidden effect, and whether it is named on its joint; a cell that could not be run has named nothing.
+    pub fn hidden(&self) -> impl Iterator<Item = (Label, bool)> {
+        let labels = self.cell.effects.iter().map(Hidden::label);
+        labels.map(|label| {
+            let is_named = self.shows(|j| !j.missed.contains(&label));
+            (label, is_named)
+        })
+    }
+
+    /// Each named effect, and whether it is hidden on its joint.
+    pub fn named(&self) -> impl Iterator<Item = (Label, bool)> {
+        self.findings.into_iter().flat_map(|f| {
+            let is_hidden = |label: &Label| !f.judgement.wrong.contains(label);
+            let labels = f.answer.named.iter().map(|named| named.label.clone());
+            labels.map(move |label| (label.clone(), is_hidden(&label)))
+        })
+    }
+
     pub fn is_told(&self) -> bool {
         self.cell.group == Group::Told
     }
@@ -152,46 +171,43 @@ pub fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
 
 /// Rigs that hide several effects: how many were named completely, and how many of the effects.
 fn rows_of_several(done: &[Done<'_>]) -> Vec<Row> {
-    let several: Vec<&Done<'_>> = done
-        .iter()
-        .filter(|d| d.cell.group == Group::Several)
-        .collect();
+    let several = of_group(done, Group::Several);
     let exact = |joints: usize| {
         let on = several.iter().filter(|d| d.cell.joints() == Some(joints));
         Rate::count(on.map(|d| d.shows(|j| j.exact)))
     };
     let within = several.iter().map(|d| d.shows(|j| j.within));
-    // A cell that could not be run has named nothing.
-    let hidden = several.iter().flat_map(|d| {
-        let found = |label: &String| d.shows(|j| !j.missed.contains(label));
-        d.cell
-            .effects
-            .iter()
-            .map(move |effect| found(&effect.label()))
-    });
-    let named = several.iter().filter_map(|d| d.findings).flat_map(|f| {
-        let wrong = &f.judgement.wrong;
-        f.answer
-            .named
-            .iter()
-            .map(|named| !wrong.contains(&named.label))
-    });
-    vec![
+    let mut rows = vec![
         Row::new("several effects, one joint: exact", exact(1)),
         Row::new("several effects, two joints: exact", exact(2)),
         Row::new(
             "several effects: exact or listed alternatives",
             Rate::count(within),
         ),
-        Row::new(
-            "several effects: hidden ones that are named",
-            Rate::count(hidden),
-        ),
-        Row::new(
-            "several effects: named ones that are hidden",
-            Rate::count(named),
-        ),
-    ]
+    ];
+    for (group, what) in [
+        (Group::Several, "several effects"),
+        (Group::Joints, "many joints"),
+    ] {
+        let all = of_group(done, group);
+        let hidden = all.iter().flat_map(|d| d.hidden());
+        let named = all.iter().flat_map(|d| d.named());
+        rows.extend([
+            Row::new(
+                format!("{what}: hidden ones that are named"),
+                Rate::count(hidden.map(|(_, is_named)| is_named)),
+            ),
+            Row::new(
+                format!("{what}: named ones that are hidden"),
+                Rate::count(named.map(|(_, is_hidden)| is_hidden)),
+            ),
+        ]);
+    }
+    rows
+}
+
+fn of_group<'d, 'l>(done: &'d [Done<'l>], group: Group) -> Vec<&'d Done<'l>> {
+    done.iter().filter(|d| d.cell.group == group).collect()
 }
 
 /// Intervals that hold the truth: for named effects and, separately, for structures that the fit was told.

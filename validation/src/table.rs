@@ -6,7 +6,8 @@ use std::fmt::Write;
 use serde::{Deserialize, Serialize};
 
 use super::cell::{Findings, Searched};
-use super::grid::{Cell, Group};
+use super::grid::{Cell, Group, Source};
+use super::hidden::Label;
 use super::rows::{Done, Rate, Row, rows};
 use residyn_core::closeloop::Verdict;
 use residyn_core::data::statistics::rank_quantile;
@@ -39,6 +40,10 @@ pub struct Summary {
     pub not_told: usize,
     /// Cells passed, by the name of each hidden effect.
     pub by_effect: Vec<Row>,
+    /// Effects on one of many joints that are named there, by name.
+    pub named_by_effect: Vec<Row>,
+    /// How many effects of robots are named where they are not hidden, by name.
+    pub false_names: BTreeMap<String, usize>,
     /// By plant and condition.
     pub parts: Vec<Part>,
     /// Intervals that hold the truth, by parameter.
@@ -118,9 +123,9 @@ pub fn summarise(lines: &[Line]) -> Summary {
         not_told: known.len() - ratios.len(),
         held_out_ratio: (!ratios.is_empty())
             .then(|| [0.5, 0.9, 1.0].map(|q| rank_quantile(&ratios, q))),
-        by_effect: by(&done, |d| {
-            d.cell.effects.iter().map(|e| e.name.clone()).collect()
-        }),
+        by_effect: by_effect(&done),
+        named_by_effect: named_by_effect(&done),
+        false_names: false_names(&done),
         parts: parts(lines),
         by_parameter: by_parameter(&done),
         failures: done.iter().filter_map(failure).collect(),
@@ -139,14 +144,40 @@ fn parts(lines: &[Line]) -> Vec<Part> {
     all.into_values().collect()
 }
 
-fn by(done: &[Done<'_>], keys: impl Fn(&Done<'_>) -> Vec<String>) -> Vec<Row> {
+fn by_effect(done: &[Done<'_>]) -> Vec<Row> {
     let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
-    for d in done.iter().filter(|d| !d.is_told()) {
-        for key in keys(d) {
-            groups.entry(key).or_default().push(d.shows(|j| j.passed));
+    let as_one = |d: &&Done<'_>| !d.is_told() && d.cell.group != Group::Joints;
+    for d in done.iter().filter(as_one) {
+        for effect in &d.cell.effects {
+            let hits = groups.entry(effect.name.clone()).or_default();
+            hits.push(d.shows(|j| j.passed));
         }
     }
     counted(groups)
+}
+
+fn named_by_effect(done: &[Done<'_>]) -> Vec<Row> {
+    let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
+    let of_joints = done.iter().filter(|d| d.cell.group == Group::Joints);
+    for (label, is_named) in of_joints.flat_map(Done::hidden) {
+        groups.entry(effect_of(&label)).or_default().push(is_named);
+    }
+    counted(groups)
+}
+
+fn false_names(done: &[Done<'_>]) -> BTreeMap<String, usize> {
+    let mut counts = BTreeMap::new();
+    let of_robots = |d: &&Done<'_>| matches!(d.cell.source, Source::Robot(_));
+    let named = done.iter().filter(of_robots).flat_map(Done::named);
+    for (label, _) in named.filter(|(_, is_hidden)| !is_hidden) {
+        *counts.entry(effect_of(&label)).or_default() += 1;
+    }
+    counts
+}
+
+/// The effect in a label, without its joint.
+fn effect_of(label: &Label) -> String {
+    label.split('@').next().unwrap_or_default().to_owned()
 }
 
 fn by_parameter(done: &[Done<'_>]) -> Vec<Row> {
@@ -242,17 +273,31 @@ pub fn markdown(summary: &Summary) -> String {
     let tables = [
         ("effect hidden", "passed", &summary.by_effect),
         (
+            "effect on one of many joints",
+            "named there",
+            &summary.named_by_effect,
+        ),
+        (
             "parameter",
             "intervals that hold the truth",
             &summary.by_parameter,
         ),
     ];
     for (what, of_what, rows) in tables {
+        if rows.is_empty() {
+            continue;
+        }
         let _ = write!(
             text,
             "\n| {what} | {of_what} | share | 95 % interval |\n|---|---|---|---|\n"
         );
         rows.iter().for_each(|row| push_row(&mut text, row));
+    }
+    if !summary.false_names.is_empty() {
+        text += "\n| named where it is not hidden | times |\n|---|---|\n";
+        for (name, times) in &summary.false_names {
+            let _ = writeln!(text, "| {name} | {times} |");
+        }
     }
     push_parts(&mut text, &summary.parts);
     push_failures(&mut text, summary);

@@ -2,9 +2,9 @@
 
 use rand::{Rng, RngExt};
 
-use super::bodies::Bodies;
 use super::motion::Motion;
 use super::{Arm, Lacks};
+use crate::bodies::Bodies;
 use crate::hidden::Hidden;
 use residyn_core::data::Joint;
 

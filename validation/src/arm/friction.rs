@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::Bodies;
+use crate::bodies::Bodies;
 use crate::hidden::Hidden;
 use crate::laws::{At, DRY, Law, SMOOTH};
 

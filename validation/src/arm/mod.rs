@@ -1,6 +1,5 @@
 //! Arms of many joints under stiff control: a prescribed motion, and the torques that it takes.
 
-mod bodies;
 mod draw;
 mod friction;
 mod motion;
@@ -9,9 +8,9 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use self::bodies::Bodies;
 use self::friction::Friction;
 use self::motion::Motion;
+use super::bodies::Bodies;
 use super::hidden::Hidden;
 use super::recording::log_name;
 use residyn_core::data::Log;
