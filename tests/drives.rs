@@ -544,10 +544,22 @@ recording = { logs = 1, duration_s = 15, start = [0, 0, 0, 0, 0, 0, 0, 0] }
         );
         // The logs hold no torque: what the law of the drive asks for is compared on request only.
         assert!(report["torque"].is_null());
+        // There the late targets pass for slow ones, but the values are those of the motion: by torques alone the stiffness
+        // is 21 % off, and half of the error is left.
         let report = scratch.json(&format!("closeloop --model servo --errors torque {LOGS}"));
         assert!(report["torque"].is_object());
-        let estimate = found(&report, "coulomb_friction", 1).unwrap();
-        assert!(holds(estimate, 0.12), "{estimate:?}");
+        assert!(found(&report, "coulomb_friction", 1).is_some());
+        let parameters = report["parameters"].as_array().unwrap();
+        for (k, truth) in [(0, 0.023), (1, 0.7), (2, 14.2)] {
+            let [value, ..] = estimate(&parameters[k]).unwrap();
+            assert!((value / truth - 1.0).abs() < 0.06, "{value} for {truth}");
+        }
+        let error = |key: &str| {
+            report["error"][key]["position_rmse"][1][0]
+                .as_f64()
+                .unwrap()
+        };
+        assert!(error("after") < 0.2 * error("before"), "{report:#}");
     }
 
     /// What the joints of a servo rig have beyond its drawing: effect, joint, values.
