@@ -72,7 +72,7 @@ name = "rotor_inertia"\njoint = 1\nJ = 0.1                       | line 13 ... `
 name = "viscous_friction"\njoint = 1\nb = -1                     | b = -1 is outside 0 to inf
 name = "viscous_friction"\njoint = 1\nb = 1\n[[effect]]\nname = "viscous_friction"\njoint = 1\nb = 1 | already acts on joint 1
 name = "actuator_delay"\njoint = 1\nd = 0.2                      | d = 0.2 is outside 0 to 0.1
-name = "viscous_friction"\njoint = 1\nb = { value = 1, logs = { a = 1 } } | line 16, column 18 ... unknown key `logs`
+name = "viscous_friction"\njoint = 1\nb = { value = 1, logs = { a = 1 } } | line 16, column 5 ... `b` has one value in all logs ... `fixed = true`
 name = "sensor_offset"\njoint = 1\nq_z = { value = 0, logs = { a = 3 } }  | line 13 ... q_z = 3 is outside -0.5 to 0.5
 "#;
 
