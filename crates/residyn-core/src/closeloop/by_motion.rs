@@ -13,7 +13,7 @@ use super::fitted::Fitted;
 use super::limbs::Limb;
 use super::problem::Problem;
 use super::refine::{Refined, with_intervals};
-use crate::data::Quantity;
+use crate::data::{Quantity, of_joints};
 use crate::identify::{FitError, LevenbergMarquardt, Window, uncertainty};
 use crate::model::Model;
 use crate::sim::metric::errors_in;
@@ -68,11 +68,7 @@ struct Comparison<'l> {
 
 impl<'l> Comparison<'l> {
     fn of(whole: &Problem<'l>, limb: &'l Limb) -> Self {
-        let of_joints = |all: &[f64]| -> Vec<f64> {
-            let joints = limb.joints().iter();
-            joints.map(|joint| all[*joint]).collect()
-        };
-        let widths = of_joints(&whole.smoothing_velocities);
+        let widths = of_joints(&whole.smoothing_velocities, limb.joints());
         let problem = |errors| Problem {
             held: whole.held.clone(),
             ..limb.problem(whole, &NOTHING, errors)
@@ -83,7 +79,7 @@ impl<'l> Comparison<'l> {
         );
         let (windows, noise) = (
             torques.shooting.windows.clone(),
-            of_joints(&whole.shooting.noise),
+            of_joints(&whole.shooting.noise, limb.joints()),
         );
         let shooting = torques
             .error_model
@@ -102,11 +98,15 @@ impl<'l> Comparison<'l> {
 
     /// The model by motion, with intervals, if each part of the logs says that motion predicts it better.
     fn better(&self, model: &Model) -> Option<Model> {
-        let is_better = (0..PARTS).all(|part| self.gain(model, part) > 0.0);
+        let stable = |problem: &Problem<'l>| {
+            (problem.in_stable_steps(model)).unwrap_or_else(|| problem.clone())
+        };
+        let trial = stable(&self.trial);
+        let is_better = (0..PARTS).all(|part| self.gain(&trial, model, part) > 0.0);
         if !is_better {
             return None;
         }
-        let problem = in_stable_steps(&self.motion, model);
+        let problem = stable(&self.motion);
         let coarse = estimate(&problem, model).ok()?;
         let fine = problem.refined();
         let found = estimate(&fine, &coarse.model).ok()?;
@@ -115,18 +115,17 @@ impl<'l> Comparison<'l> {
     }
 
     /// By how much motion is the better guide to a part that is left out: the logarithm of the ratio of the errors.
-    fn gain(&self, model: &Model, part: usize) -> f64 {
-        let trial = in_stable_steps(&self.trial, model);
+    fn gain(&self, trial: &Problem<'l>, model: &Model, part: usize) -> f64 {
         let (left_out, kept) = parted(&trial.shooting.windows, part);
         let error = |guide: &Problem<'l>, start: &Model| {
             let kept = guide.over(guide.shooting.over(kept.clone()));
             let fitted = estimate(&kept, start).ok()?;
-            Some((squares(&trial, &fitted.model, &left_out), fitted.model))
+            Some((squares(trial, &fitted.model, &left_out), fitted.model))
         };
         let Some((by_torques, model)) = error(&self.torques, model) else {
             return 0.0;
         };
-        error(&trial, &model).map_or(0.0, |(by_motion, _)| log_ratio(&by_torques, &by_motion))
+        error(trial, &model).map_or(0.0, |(by_motion, _)| log_ratio(&by_torques, &by_motion))
     }
 }
 
@@ -137,15 +136,6 @@ fn parted(windows: &[Window], part: usize) -> (Vec<Window>, Vec<Window>) {
         (windows.iter().enumerate()).partition(|(k, _)| stretch(*k) % PARTS == part);
     let windows = |of: Vec<(usize, &Window)>| of.into_iter().map(|(_, window)| *window).collect();
     (windows(own), windows(others))
-}
-
-/// The problem in steps in which a model's friction brings each joint to rest as it should.
-fn in_stable_steps<'l>(problem: &Problem<'l>, model: &Model) -> Problem<'l> {
-    let step_s = problem.stable_step_s(model);
-    match step_s < problem.shooting.longest_s() {
-        true => problem.over(problem.shooting.clone().in_steps_of(step_s)),
-        false => problem.clone(),
-    }
 }
 
 fn estimate(problem: &Problem<'_>, model: &Model) -> Result<Fitted, FitError> {

@@ -101,12 +101,9 @@ impl<'a> Problem<'a> {
     /// it should. Without one if the model diverges or most rigs have nothing that the file lacks.
     pub(super) fn with_first_optimum(&self) -> Self {
         let found = self.near_first_optimum(self.declared);
-        let step_s = (found.first.as_ref()).map(|first| found.stable_step_s(&first.model));
-        match step_s.filter(|step_s| *step_s < found.shooting.longest_s()) {
-            Some(step_s) => {
-                let shooting = found.shooting.clone().in_steps_of(step_s);
-                found.over(shooting).near_first_optimum(self.declared)
-            }
+        let stable = (found.first.as_ref()).and_then(|first| found.in_stable_steps(&first.model));
+        match stable {
+            Some(stable) => stable.near_first_optimum(self.declared),
             None => found,
         }
     }
@@ -122,10 +119,13 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The longest step that a model's friction allows.
-    pub(super) fn stable_step_s(&self, model: &Model) -> f64 {
+    /// The same problem in shorter steps, in which a model's friction brings each joint to rest as it should; `None` if
+    /// its own are short enough.
+    pub(super) fn in_stable_steps(&self, model: &Model) -> Option<Self> {
         let stable_s = longest_stable_step(&self.shooting, &self.compiled(model));
-        stable_s.max(self.settings.fit.shortest_step_s)
+        let step_s = stable_s.max(self.settings.fit.shortest_step_s);
+        (step_s < self.shooting.longest_s())
+            .then(|| self.over(self.shooting.clone().in_steps_of(step_s)))
     }
 
     /// The declared model, fitted to torques, in which it is so nearly linear that no start is poor. The residual of

@@ -94,8 +94,8 @@ impl Model {
         self.names_under(Quantity::Command)
     }
 
-    /// The drives' torques along a log (`[joint][row]`, N m or N), at the declared values of that log, before any effect; the log's
-    /// own torques if it holds torques.
+    /// The drives' torques along a log (`[joint][row]`, N m or N), at the declared values of that log, before any effect;
+    /// the log's own torques if it holds torques.
     pub fn drive_torques(&self, log: &Log) -> Vec<Vec<f64>> {
         let channels = log.q.iter().chain(&log.qd).chain(&log.tau);
         let channels: Vec<&[f64]> = channels.chain([&log.time]).map(Vec::as_slice).collect();
