@@ -16,7 +16,7 @@ use residyn_core::closeloop::{
 };
 use residyn_core::data::{Audit, Joint, Log};
 use residyn_core::identify::{Combination, Fit, FitError};
-use residyn_core::model::{FittedEffect, Model, Origin, Parameter, PerLogValue, like_joints};
+use residyn_core::model::{FittedEffect, Model, Origin, Parameter, PerLogValue};
 use residyn_core::sim::metric::{Assessment, Summary, summarise};
 
 /// Names of the files in the folder of a report.
@@ -33,7 +33,7 @@ impl Report {
     pub fn new(outcome: &Outcome, origin: &Origin) -> Self {
         let model = outcome.models.after.model.absorbed();
         let by_log = by_log(outcome);
-        let like = like_joints(&model.joint_names);
+        let like = model.like_joints();
         let declared = declared(outcome, &model);
         let of_joints = of_joints(&declared);
         let all: Vec<_> = found(outcome).into_iter().chain(declared).collect();

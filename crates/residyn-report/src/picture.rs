@@ -7,7 +7,6 @@ use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
 use residyn_core::closeloop::{ErrorModel, ForceSample, Outcome, ResidualForce};
 use residyn_core::data::Joint;
 use residyn_core::identify::FitError;
-use residyn_core::model::like_joints;
 use residyn_core::sim::metric::{Assessment, summarise};
 use residyn_plot::{
     Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapeModel, ShapePanel,
@@ -206,7 +205,7 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
     let title = "Open-loop position error on the test logs";
     if is_large(joints) {
         let middle = horizons / 2;
-        let like = like_joints(&outcome.models.after.model.joint_names);
+        let like = outcome.models.after.model.like_joints();
         let ordered = in_order(joints, &like).into_iter();
         let rows: Vec<ErrorRow> = ordered.map(|(joint, _)| row(joint, middle)).collect();
         let horizon_s = errors.before.horizons[middle].horizon_s;

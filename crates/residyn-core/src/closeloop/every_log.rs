@@ -7,22 +7,32 @@ use super::problem::Problem;
 use super::select::is_worse;
 use super::settings::Settings;
 use crate::data::Log;
-use crate::sim::metric::{errors_in, torque_error_with, windows};
+use crate::identify::Values;
+use crate::sim::metric::{errors_in, windows};
 
 /// Torque errors of a model on each of some logs.
 pub(super) struct EveryLog<'l> {
-    /// Per joint in N m (or N); `None` for a log that is too short.
-    errors: Vec<(&'l Log, Option<Vec<f64>>)>,
-    /// The joints with dry friction.
-    dry: Vec<bool>,
+    logs: Vec<OneLog<'l>>,
+    /// Sums of squares, log by log, one per joint.
+    squares: Vec<Vec<f64>>,
+}
+
+/// A log, as fits compare it: without the rows around those that its logger dropped.
+struct OneLog<'l> {
+    log: &'l Log,
+    problem: Problem<'l>,
 }
 
 impl<'l> EveryLog<'l> {
-    pub fn of(logs: impl Iterator<Item = &'l Log>, model: &Fitted) -> Self {
-        let dry = model.model.dry_joints();
+    pub fn of(problem: &Problem<'l>, logs: impl Iterator<Item = &'l Log>, model: &Fitted) -> Self {
+        let one = |log| OneLog {
+            log,
+            problem: problem.on(std::slice::from_ref(log)),
+        };
+        let logs: Vec<OneLog<'l>> = logs.map(one).collect();
         Self {
-            errors: logs.map(|log| (log, errors(model, log, &dry))).collect(),
-            dry,
+            squares: logs.iter().map(|log| log.squares(model)).collect(),
+            logs,
         }
     }
 
@@ -31,18 +41,35 @@ impl<'l> EveryLog<'l> {
     pub fn fits_as_well_without(&self, standing: &Standing) -> Option<&'l Log> {
         let without = standing.without.as_ref().ok()?;
         let joints = standing.effect.joints();
-        let of_effect =
-            |rms: &[f64]| -> f64 { joints.iter().map(|joint| rms[*joint].powi(2)).sum() };
-        let helps = |(log, with): &&(&Log, Option<Vec<f64>>)| {
-            let without = errors(without, log, &self.dry);
-            let (Some(with), Some(without)) = (with, without) else {
-                return false;
-            };
-            let [with, without] = [with, &without].map(|rms| of_effect(rms));
+        let of_effect = |squares: &[f64]| -> f64 { joints.iter().map(|j| squares[*j]).sum() };
+        let helps = |(log, with): &(&OneLog<'l>, &Vec<f64>)| {
+            let [with, without] = [with, &log.squares(without)].map(|squares| of_effect(squares));
             with < without || without == 0.0
         };
-        let found = self.errors.iter().find(|of_log| !helps(of_log));
-        found.map(|(log, _)| *log)
+        let found = self
+            .logs
+            .iter()
+            .zip(&self.squares)
+            .find(|of_log| !helps(of_log));
+        found.map(|(log, _)| log.log)
+    }
+}
+
+impl OneLog<'_> {
+    fn squares(&self, model: &Fitted) -> Vec<f64> {
+        let (problem, joints) = (&self.problem, self.problem.declared.joints);
+        let (dynamics, shooting) = (problem.compiled(&model.model), &problem.shooting);
+        let values = Values::of(&dynamics, problem.logs);
+        let left = shooting.residuals(&dynamics, &values, &shooting.initial_start_states(0));
+        let left = left.concat();
+        let of_joint = |joint| {
+            left.iter()
+                .skip(joint)
+                .step_by(joints)
+                .map(|left| left * left)
+                .sum()
+        };
+        (0..joints).map(of_joint).collect()
     }
 }
 
@@ -87,8 +114,4 @@ impl SetApart {
 fn exceeds(squares: &[f64], others: &[f64], settings: &Settings) -> bool {
     let chance = settings.establish.worse_standard_errors;
     is_worse(squares, others, chance, settings.select.worse_share)
-}
-
-fn errors(model: &Fitted, log: &Log, dry: &[bool]) -> Option<Vec<f64>> {
-    Some(torque_error_with(&model.model, std::slice::from_ref(log), dry)?.rms)
 }

@@ -51,7 +51,7 @@ pub(super) fn judge<'a>(
     match problem.error_model {
         ErrorModel::OutputError => chosen.ask_logs_apart(&problem, apart),
         ErrorModel::InverseDynamics => {
-            chosen.ask_every_log(problem.logs.iter().chain(apart));
+            chosen.ask_every_log(&problem, apart);
             chosen.ask_places(&problem, apart);
             if let Some((after, standing)) = problem.with_payload(&chosen.after) {
                 chosen.after = after;
@@ -146,8 +146,8 @@ impl Chosen {
     }
 
     /// Effects are not established if the torques of some log fit as well without them.
-    fn ask_every_log<'l>(&mut self, logs: impl Iterator<Item = &'l Log>) {
-        let logs = EveryLog::of(logs, &self.after);
+    fn ask_every_log(&mut self, problem: &Problem<'_>, apart: &[Log]) {
+        let logs = EveryLog::of(problem, problem.logs.iter().chain(apart), &self.after);
         demote(&mut self.standings, |standing| {
             let log = logs.fits_as_well_without(standing)?;
             Some(format!(

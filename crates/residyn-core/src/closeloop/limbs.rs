@@ -5,6 +5,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::alike::{Part, agree};
 use super::diagnostics::diagnose;
 use super::error::StudyError;
 use super::error_model::ErrorModel;
@@ -13,16 +14,16 @@ use super::fit::Declared;
 use super::fitted::Fitted;
 use super::gravity::shares_of_gravity;
 use super::judge::{Found, mark};
-use super::pipeline::find;
 use super::plainer::Unused;
 use super::problem::Problem;
+use super::searched::Searched;
 use super::select::{Rival, Round, Tried};
 use super::stage::Watch;
 use crate::data::{Audit, Joint, Log};
 use crate::identify::{FitError, as_it_stands};
 use crate::model::{FittedEffect, Library, Model, PerLogValue};
 
-/// As [`find`], limb by limb; `None` if there is only one limb, or motion is compared, in which all joints are one part.
+/// As [`find`](super::find), limb by limb; `None` if there is only one limb, or motion is compared, in which all joints are one part.
 pub(super) fn find_in_limbs<'a>(
     declared: &Declared<'a>,
     apart: &[Log],
@@ -38,11 +39,17 @@ pub(super) fn find_in_limbs<'a>(
     let limbs: Vec<Limb> = joints.into_iter().map(limb).collect();
     // The same draws for each limb: no result depends on their order.
     let seed = rng.random();
-    let found = limbs.par_iter().map(|limb| {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        limb.find(problem, &mut rng, watch)
-    });
-    let found: Vec<Found<'_>> = found.collect::<Result<_, StudyError>>()?;
+    let mut draws: Vec<_> = limbs
+        .iter()
+        .map(|_| ChaCha8Rng::seed_from_u64(seed))
+        .collect();
+    let searched = limbs.par_iter().zip(&mut draws);
+    let parts = searched.map(|(limb, rng)| limb.search(problem, rng, watch));
+    let mut parts: Vec<Part<'_>> = parts.collect::<Result<_, StudyError>>()?;
+    agree(problem.declared, &mut parts, watch);
+    let judged = parts.into_par_iter().zip(&limbs).zip(&mut draws);
+    let found = judged.map(|((part, limb), rng)| part.searched.judged(&limb.apart, rng));
+    let found: Vec<Found<'_>> = found.collect();
     let whole = Whole {
         declared,
         limbs: limbs.iter().zip(&found).collect(),
@@ -81,15 +88,18 @@ impl Limb {
         }
     }
 
-    /// What the limb lacks.
-    fn find<'l>(
+    /// Search for what the limb lacks.
+    fn search<'l>(
         &'l self,
         whole: &Problem<'l>,
         rng: &mut impl Rng,
         watch: &dyn Watch,
-    ) -> Result<Found<'l>, StudyError> {
+    ) -> Result<Part<'l>, StudyError> {
         let problem = self.problem(whole, whole.library, whole.error_model);
-        find(problem.fit_declared()?, &self.apart, rng, watch)
+        Ok(Part {
+            joints: self.joints.clone(),
+            searched: Searched::by(problem.fit_declared()?, &self.apart, rng, watch)?,
+        })
     }
 
     pub(super) fn joints(&self) -> &[Joint] {

@@ -5,6 +5,7 @@
 //! [`establish`] each, [`diagnose`] what remains, [`discriminate`] between explanations, [`refine`], [`learn`] and
 //! [`score`]. They work on a [`Problem`], which none of them changes.
 
+mod alike;
 mod by_log;
 mod by_motion;
 mod calibrate;
@@ -37,6 +38,7 @@ mod problem;
 mod refine;
 mod request;
 mod score;
+mod searched;
 mod select;
 mod settings;
 mod smoothing;

@@ -22,6 +22,17 @@ pub(super) fn directions(speeds: &[f64], width: f64, torque: TorqueColumn) -> Ve
     [&steps[..1], &inner, &steps[steps.len() - 1..]].concat()
 }
 
+/// The same at the middles of steps, as means over them; speeds are those in the middles, too.
+pub(super) fn directions_over_steps(speeds: &[f64], width: f64) -> Vec<f64> {
+    let last = speeds.len().saturating_sub(1);
+    let mean = |k: usize| {
+        let [before, after] = [speeds[k.saturating_sub(1)], speeds[(k + 1).min(last)]];
+        let ends = [before, after].map(|beside| 0.5 * (speeds[k] + beside) / width);
+        mean_tanh(ends[0], ends[1])
+    };
+    (0..speeds.len()).map(mean).collect()
+}
+
 /// The mean of tanh between two values.
 fn mean_tanh(from: f64, to: f64) -> f64 {
     let ln_cosh = |x: f64| x.abs() + (-2.0 * x.abs()).exp().ln_1p() - LN_2;

@@ -1,6 +1,6 @@
 //! The motion of a log as the torque error uses it: resampled at even steps, low-pass filtered, differentiated.
 
-use super::direction::directions;
+use super::direction::{directions, directions_over_steps};
 use super::instant::{ROUNDING, SAME_S};
 use super::log::Log;
 use super::low_pass::LowPass;
@@ -35,10 +35,53 @@ pub struct Smooth {
     pub rests: Vec<Vec<bool>>,
 }
 
+/// Differences of an even channel at a row, by the values up to two rows before and after it.
+#[derive(Debug)]
+struct Stencils {
+    slope: [f64; 5],
+    curvature: [f64; 5],
+}
+
+/// Central differences, exact to second order in the step.
+static CENTRAL: Stencils = Stencils {
+    slope: [0.0, -0.5, 0.0, 0.5, 0.0],
+    curvature: [0.0, 1.0, -2.0, 1.0, 0.0],
+};
+
+/// Exact to fourth order. At a hundred rows a second, central differences take one percent off a velocity at 4 Hz.
+static FOURTH_ORDER: Stencils = Stencils {
+    slope: [1.0 / 12.0, -2.0 / 3.0, 0.0, 2.0 / 3.0, -1.0 / 12.0],
+    curvature: [-1.0 / 12.0, 4.0 / 3.0, -2.5, 4.0 / 3.0, -1.0 / 12.0],
+};
+
+impl Stencils {
+    /// Rows that a difference needs on either side.
+    const REACH: usize = 2;
+
+    fn at(of: &[f64; 5], channel: &[f64], row: usize) -> f64 {
+        let around = &channel[row - Self::REACH..=row + Self::REACH];
+        of.iter()
+            .zip(around)
+            .map(|(share, value)| share * value)
+            .sum()
+    }
+}
+
+/// Where along a log its channels are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Places {
+    Rows,
+    /// In the middles of the steps, as means over each step: what is held over a step needs no interpolation then, which
+    /// would take a share of fast commands away.
+    Steps,
+}
+
 /// How the channels of a log are smoothed, and which rows of them are used.
 #[derive(Debug, Clone)]
 pub struct Smoothing {
     step_s: f64,
+    places: Places,
+    stencils: &'static Stencils,
     /// As a share of the sampling rate.
     cutoff: f64,
     filter: LowPass,
@@ -53,14 +96,35 @@ pub struct Smoothing {
 }
 
 impl Smoothing {
-    /// Smoothing at the median step of a log, without half a second at either end and without left-out intervals.
+    /// Smoothing at the median step of a log, without half a second at either end and without left-out intervals: linear
+    /// interpolation and central differences, as the torque error is defined.
     pub fn of(log: &Log) -> Self {
+        Self::at(log, Places::Rows, &CENTRAL)
+    }
+
+    /// The same for fits, more precisely: means of the angles over the steps beside torques that are held over them or are
+    /// means themselves, and differences of fourth order.
+    pub fn precise(log: &Log) -> Self {
+        let places = match log.torque {
+            TorqueColumn::Sampled => Places::Rows,
+            TorqueColumn::Held | TorqueColumn::Mean => Places::Steps,
+        };
+        Self::at(log, places, &FOURTH_ORDER)
+    }
+
+    fn at(log: &Log, places: Places, stencils: &'static Stencils) -> Self {
         let step_s = log.median_step();
         let cutoff = (CUTOFF_HZ * step_s).min(HIGHEST / 2.0);
-        let even = even(log, step_s);
-        let inner = 1..even.len().saturating_sub(1);
+        let mut even = even(log, step_s);
+        if places == Places::Steps {
+            even.pop();
+            even.iter_mut().for_each(|time| *time += 0.5 * step_s);
+        }
+        let inner = Stencils::REACH..even.len().saturating_sub(Stencils::REACH);
         Self {
             step_s,
+            places,
+            stencils,
             cutoff,
             filter: LowPass::new(cutoff),
             middle: middles(&log.time, step_s),
@@ -113,6 +177,14 @@ impl Smoothing {
         self.filter.apply(&self.at_even(times, values))
     }
 
+    /// The angles of a joint, at all even times.
+    fn angles(&self, q: &[f64]) -> Vec<f64> {
+        match self.places {
+            Places::Rows => self.at_even(&self.logged, q),
+            Places::Steps => self.at_even(&self.middle, &step_means(&self.logged, q)),
+        }
+    }
+
     fn at_even(&self, times: &[f64], values: &[f64]) -> Vec<f64> {
         resampled(self.even.iter().copied(), times, values).collect()
     }
@@ -137,16 +209,20 @@ impl Smooth {
             filter,
             even,
             used,
+            stencils,
             ..
         } = smoothing;
-        let read = |q: &Vec<f64>| smoothing.at_even(&smoothing.logged, q);
-        let read: Vec<Vec<f64>> = log.q.iter().map(read).collect();
+        let read: Vec<Vec<f64>> = log.q.iter().map(|q| smoothing.angles(q)).collect();
         let q: Vec<Vec<f64>> = read.iter().map(|q| filter.apply(q)).collect();
         // Angles a step.
         let speeds: Vec<Vec<f64>> = q.iter().map(|q| central_differences(q)).collect();
         let direction = |(speeds, width): (&Vec<f64>, &f64)| {
             let width = width.max(f64::MIN_POSITIVE) * step_s;
-            smoothing.used_of(&filter.apply(&directions(speeds, width, log.torque)))
+            let directions = match smoothing.places {
+                Places::Rows => directions(speeds, width, log.torque),
+                Places::Steps => directions_over_steps(speeds, width),
+            };
+            smoothing.used_of(&filter.apply(&directions))
         };
         let of_joints = read.iter().zip(&q).zip(&speeds);
         let at_rest = of_joints.map(|((read, q), speeds)| rests(read, q, speeds, *cutoff));
@@ -154,11 +230,12 @@ impl Smooth {
             let of = |q: &Vec<f64>| used.iter().map(|row| value(q, *row)).collect();
             q.iter().map(of).collect::<Vec<Vec<f64>>>()
         };
+        let Stencils { slope, curvature } = stencils;
         Self {
             directions: speeds.iter().zip(widths).map(direction).collect(),
             rests: at_rest.map(|rests| smoothing.used_of(&rests)).collect(),
-            qd: each(&|q, k| (q[k + 1] - q[k - 1]) / (2.0 * step_s)),
-            qdd: each(&|q, k| (q[k + 1] - 2.0 * q[k] + q[k - 1]) / step_s.powi(2)),
+            qd: each(&|q, k| Stencils::at(slope, q, k) / step_s),
+            qdd: each(&|q, k| Stencils::at(curvature, q, k) / step_s.powi(2)),
             q: each(&|q, k| q[k]),
             tau: (0..log.joints())
                 .map(|joint| smoothing.torques(log, joint))
@@ -187,6 +264,27 @@ fn middles(time: &[f64], step_s: f64) -> Vec<f64> {
     let inner = time.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
     let last = time.last().map(|last| last + 0.5 * step_s);
     inner.chain(last).collect()
+}
+
+/// The means of a channel over the steps between its rows, the last one its last value: the trapezoidal rule, less its
+/// error by the curvature there.
+fn step_means(time: &[f64], channel: &[f64]) -> Vec<f64> {
+    let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let slopes = channel.windows(2).zip(&steps);
+    let slopes: Vec<f64> = slopes
+        .map(|(pair, step)| (pair[1] - pair[0]) / step)
+        .collect();
+    let curvature = |row: usize| match row {
+        0 => 0.0,
+        row if row >= slopes.len() => 0.0,
+        row => 2.0 * (slopes[row] - slopes[row - 1]) / (steps[row] + steps[row - 1]),
+    };
+    let mean = |k: usize| {
+        let bend = 0.5 * (curvature(k) + curvature(k + 1));
+        0.5 * (channel[k] + channel[k + 1]) - steps[k].powi(2) / 12.0 * bend
+    };
+    let last = channel.last().copied();
+    (0..steps.len()).map(mean).chain(last).collect()
 }
 
 /// Even steps over the log; none if the log, or the part of one, is nearly all pause.

@@ -19,7 +19,7 @@ pub(super) struct Rows {
 impl Rows {
     /// Friction reverses over these speeds, one per joint.
     pub fn of(log: &Log, smoothing_velocities: &[f64]) -> Self {
-        let smoothing = Smoothing::of(log).thinned();
+        let smoothing = Smoothing::precise(log).thinned();
         Self {
             smooth: Smooth::by(&smoothing, log, smoothing_velocities),
             smoothing,

@@ -42,6 +42,7 @@ pub struct Effect {
     pub shown_by: String,
     pub acts_on: ActsOn,
     pub shows_in: ShowsIn,
+    pub alike_on: AlikeOn,
     /// Most machines have it, on every joint: such effects are tried together before all others, first those of rank 1,
     /// then those up to rank 2, and so on. Effects of rank 1 are also added to a model before its first fit.
     pub baseline: Option<usize>,
@@ -67,6 +68,18 @@ pub enum ShowsIn {
     Torques,
     /// Of torques that the law of a drive asks for.
     LawTorques,
+}
+
+/// The joints that have the effect alike, if one of them has it: it belongs to how they are built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum AlikeOn {
+    /// It belongs to a single joint.
+    #[default]
+    None,
+    /// Joints that are built alike.
+    LikeJoints,
+    /// All that commands drive: one bus brings the commands.
+    Commanded,
 }
 
 /// How an effect enters the equations of its joint. Formulas are in `q`, `qd`, `tau`, `load`, `t` of that joint and in

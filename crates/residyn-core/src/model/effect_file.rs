@@ -48,6 +48,7 @@ impl Effect {
             baseline: table.baseline,
             acts_on: table.joints.unwrap_or_default(),
             shows_in: table.shows_in.unwrap_or_default(),
+            alike_on: table.alike_on.unwrap_or_default(),
         })
     }
 }

@@ -11,7 +11,7 @@ use super::input_layout::InputLayout;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Energy, Equations, Model, Motion, Places};
 use super::tables::{ChainTable, EnergyTable, ModelFile};
-use super::{effects_in_file, logs_in_file, sections, tree_in_file};
+use super::{effects_in_file, like_in_file, logs_in_file, sections, tree_in_file};
 use crate::data::{Columns, Joint, Quantity};
 use crate::expr::{Formula, Graph, Scope, parse};
 
@@ -31,6 +31,7 @@ impl Model {
         system.check_joint_names()?;
         system.check_smoothing_velocity()?;
         let prismatic = system.prismatic()?;
+        let like = like_in_file::groups(&system)?;
         let joints = system.joints;
         let driven_by = match file.drive {
             None => Quantity::Torque,
@@ -53,6 +54,7 @@ impl Model {
                 torque: file.log.and_then(|log| log.torque),
                 ..columns(file.columns, joints, driven_by, &system.joint_names)?
             },
+            like,
             joint_names: system.joint_names,
             configurations: logs_in_file::configurations(file.logs, &parameters)?,
             own,

@@ -1,5 +1,6 @@
-//! Like joints: those of one role on limbs that are built alike, found by their names.
+//! Like joints: those of one role on limbs that are built alike.
 
+use super::system::Model;
 use crate::data::Joint;
 
 /// The words by which names tell limbs apart, in lower case. Numbers are none of them: along a chain they count joints of
@@ -17,7 +18,7 @@ const LIMBS: [&str; 29] = [
 ///
 /// `names` holds one name per joint, in order, or nothing for a rig without names. Each group has at least two joints, in
 /// order; groups are in the order of their first joints, and joints that are like no other are in none.
-pub fn like_joints(names: &[String]) -> Vec<Vec<Joint>> {
+fn of_names(names: &[String]) -> Vec<Vec<Joint>> {
     let mut groups: Vec<(String, Vec<Joint>)> = Vec::new();
     for (joint, name) in Joint::all(names.len()).zip(names) {
         let Some(role) = role(name) else {
@@ -30,6 +31,14 @@ pub fn like_joints(names: &[String]) -> Vec<Vec<Joint>> {
     }
     let groups = groups.into_iter().map(|(_, joints)| joints);
     groups.filter(|joints| joints.len() > 1).collect()
+}
+
+impl Model {
+    /// Groups of joints that are built alike: those that its file gives, or else those that names tell.
+    pub fn like_joints(&self) -> Vec<Vec<Joint>> {
+        let of_file = self.like.clone();
+        of_file.unwrap_or_else(|| of_names(&self.joint_names))
+    }
 }
 
 /// The name with a star for each word that names a limb; `None` if no word does.
@@ -66,12 +75,12 @@ fn begins_word(before: char, letter: char, after: Option<char>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::like_joints;
+    use super::of_names;
 
     /// The groups of these names, as numbers of joints.
     fn groups(names: &[&str]) -> Vec<Vec<usize>> {
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
-        let groups = like_joints(&names).into_iter();
+        let groups = of_names(&names).into_iter();
         groups
             .map(|joints| joints.into_iter().map(|joint| joint.number()).collect())
             .collect()

@@ -62,6 +62,7 @@ impl Model {
         let mut limb = Self {
             joints: joints.len(),
             joint_names: of_joints(&self.joint_names, joints),
+            like: (self.like.as_ref()).map(|groups| like_of_limb(groups, joints)),
             prismatic: of_joints(&self.prismatic, joints),
             smoothing_velocity: (self.smoothing_velocity.as_ref())
                 .map(|widths| of_joints(widths, joints)),
@@ -103,6 +104,16 @@ impl Model {
         let free = parameters.filter(|(_, p)| !p.fixed && names.contains(p.name.as_str()));
         free.map(|(k, _)| k).collect()
     }
+}
+
+/// Of groups of joints those that are in a limb, as its joints.
+fn like_of_limb(groups: &[Vec<Joint>], limb: &[Joint]) -> Vec<Vec<Joint>> {
+    let own = |joint: &Joint| limb.iter().position(|own| own == joint).map(Joint::at);
+    let groups = groups.iter();
+    groups
+        .map(|group| group.iter().filter_map(own).collect())
+        .filter(|group: &Vec<Joint>| group.len() > 1)
+        .collect()
 }
 
 impl FittedEffect {

@@ -19,6 +19,7 @@ mod fitted;
 mod input_layout;
 mod library;
 mod like;
+mod like_in_file;
 mod limb;
 mod logs_in_file;
 mod network;
@@ -40,13 +41,12 @@ mod written;
 pub use call::{Call, InputFile};
 pub use configuration::{Configuration, InLog};
 pub use dynamics::{Dynamics, Parameter, PerLogValue};
-pub use effect::{ActsOn, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure, ShowsIn};
+pub use effect::{ActsOn, AlikeOn, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure, ShowsIn};
 pub use error::ModelError;
 pub use filter::{CommandFilter, Filter};
 pub use fitted::{FittedEffect, Status};
 pub use input_layout::InputLayout;
 pub use library::Library;
-pub use like::like_joints;
 pub use network::to_f32;
 pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,

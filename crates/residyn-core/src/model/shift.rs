@@ -1,7 +1,7 @@
 //! Declared parameters that are held fixed although the rig may have another value.
 
 use super::Parameter;
-use super::effect::{ActsOn, Effect, EffectParameter, Entry, Measure, ShowsIn};
+use super::effect::{ActsOn, AlikeOn, Effect, EffectParameter, Entry, Measure, ShowsIn};
 use super::fitted::FittedEffect;
 use super::reader::Located;
 use super::system::{Model, Motion};
@@ -91,6 +91,7 @@ fn shift(k: usize, declared: &Parameter) -> Effect {
         ),
         acts_on: ActsOn::All,
         shows_in: ShowsIn::Any,
+        alike_on: AlikeOn::None,
         baseline: None,
     }
 }

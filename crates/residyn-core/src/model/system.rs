@@ -60,6 +60,8 @@ pub struct Model {
     pub joints: usize,
     /// Names of the joints in a URDF or on the rig; empty if they have only numbers.
     pub joint_names: Vec<String>,
+    /// Groups of joints that are built alike, as the file gives them; `None` if it gives none.
+    pub like: Option<Vec<Vec<Joint>>>,
     /// For each joint, whether it slides (m, N) rather than turns (rad, N m).
     pub prismatic: Vec<bool>,
     /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump. `None` if the file sets none:

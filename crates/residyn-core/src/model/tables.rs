@@ -5,11 +5,12 @@
 //! `columns_in_file.rs`, `drive.rs`, `sections.rs`, `logs_in_file.rs` and `effects_in_file.rs`.
 
 use super::effect::ActsOn;
+use super::effect::AlikeOn;
 use super::effect::Measure;
 use super::effect::ShowsIn;
 use super::filter::CommandFilter;
 use super::reader::{Entry, FileError, Located, Section};
-use super::values::{ColumnName, EachLog, Limits, Named, OrTable, Per, Read};
+use super::values::{ColumnName, EachLog, JointKey, Limits, Named, OrTable, Per, Read};
 use crate::data::TorqueColumn;
 use crate::expr::Formula;
 
@@ -66,6 +67,7 @@ tables! {
         about: Option<String>,
         joints: usize,
         joint_names: Vec<String>,
+        like: Option<Vec<Vec<JointKey>>>,
         prismatic: Vec<usize>,
         smoothing_velocity: Option<Vec<f64>>,
     }
@@ -160,6 +162,7 @@ tables! {
         shown_by: Option<String>,
         joints: Option<ActsOn>,
         shows_in: Option<ShowsIn>,
+        alike_on: Option<AlikeOn>,
         valid_if: Option<Located<Formula>>,
         baseline: Option<usize>,
     }

@@ -2,7 +2,7 @@
 
 use toml::de::DeValue;
 
-use super::effect::{ActsOn, Measure, ShowsIn};
+use super::effect::{ActsOn, AlikeOn, Measure, ShowsIn};
 use super::filter::CommandFilter;
 use super::fitted::Status;
 use super::reader::{Entry, FileError, Located, Section};
@@ -41,6 +41,12 @@ pub(super) struct Limits(pub [f64; 2]);
 
 /// The name of a log's column, or its number, from 1.
 pub(super) struct ColumnName(pub String);
+
+/// A joint by its name or its number, from 1, and where it stands in the file.
+pub(super) struct JointKey {
+    pub key: String,
+    pub at: usize,
+}
 
 /// What has a separate value of an effect's parameter.
 #[derive(Clone, Copy)]
@@ -213,6 +219,21 @@ impl Read<'_> for ColumnName {
     }
 }
 
+impl Read<'_> for JointKey {
+    const NAMES: [&'static str; 2] = ColumnName::NAMES;
+
+    fn read(entry: Entry<'_, '_>) -> Result<Self, FileError> {
+        let key = match entry.value() {
+            DeValue::Integer(_) => usize::read(entry)?.to_string(),
+            _ => String::read(entry)?,
+        };
+        Ok(Self {
+            key,
+            at: entry.at(),
+        })
+    }
+}
+
 impl Read<'_> for Limits {
     const NAMES: [&'static str; 2] = ["a list of 2 numbers", "values"];
 
@@ -260,6 +281,14 @@ impl Word for ShowsIn {
         ("any", Self::Any),
         ("torques", Self::Torques),
         ("law torques", Self::LawTorques),
+    ];
+}
+
+impl Word for AlikeOn {
+    const WORDS: &'static [(&'static str, Self)] = &[
+        ("none", Self::None),
+        ("like joints", Self::LikeJoints),
+        ("commanded", Self::Commanded),
     ];
 }
 

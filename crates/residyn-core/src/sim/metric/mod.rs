@@ -13,8 +13,8 @@ pub use open_loop::{assess, window_count};
 pub use open_loop::{errors_in, windows};
 pub use start_noise::error_of_starts;
 pub use summary::{Summary, summarise};
+pub(crate) use torque::balance_of;
 pub use torque::{
     NeededTorques, TorqueError, needed_torques, torque_column, torque_error, torques_leave,
 };
-pub(crate) use torque::{balance_of, torque_error_with};
 pub use trace::{Trace, traces};

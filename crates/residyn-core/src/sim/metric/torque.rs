@@ -53,7 +53,7 @@ pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
 
 /// The same, with dry friction on the joints that are `dry`: errors of models that differ in friction are compared over
 /// the same rows.
-pub(crate) fn torque_error_with(model: &Model, logs: &[Log], dry: &[bool]) -> Option<TorqueError> {
+fn torque_error_with(model: &Model, logs: &[Log], dry: &[bool]) -> Option<TorqueError> {
     let balance = model.torque_balance()?;
     let of_log = |log: &Log| {
         let (logged, differences) = differences(model, &balance, log);

@@ -1,0 +1,208 @@
+//! Stage 4, at its very end: what the search of one joint can learn from those of joints that are built alike.
+//!
+//! One bus brings the commands of all drives, and like joints have like motors and gears: what most of them have, the
+//! others have too, unless the logs contradict. A joint whose own logs hardly tell a delay from a lag, or Stribeck friction
+//! from dry friction, is thus named by those that do.
+
+use rayon::prelude::*;
+
+use super::plainer::Unused;
+use super::searched::Searched;
+use super::select::{Trial, p_value};
+use super::stage::Watch;
+use crate::data::{Joint, Quantity};
+use crate::model::{AlikeOn, FittedEffect, Model, Status};
+
+/// A part of a rig that was searched on its own, and its joints.
+pub(super) struct Part<'a> {
+    pub joints: Vec<Joint>,
+    pub searched: Searched<'a>,
+}
+
+/// An effect that at least half of some joints that are alike have.
+struct Usual {
+    /// As the joint with the median value has it.
+    effect: FittedEffect,
+    joints: Vec<Joint>,
+    is_of_most: bool,
+}
+
+/// Replace and add effects where like joints have others, as far as the logs do not contradict.
+pub(super) fn agree(whole: &Model, parts: &mut [Part<'_>], watch: &dyn Watch) {
+    let usual = usual(whole, parts);
+    if usual.is_empty() {
+        return;
+    }
+    parts.par_iter_mut().for_each(|part| {
+        if let Some(searched) = part.agreeing(&usual, watch) {
+            part.searched = searched;
+        }
+        part.confirm(&usual);
+    });
+}
+
+/// The effects that at least half of the joints that are alike have, one of them established.
+fn usual(whole: &Model, parts: &[Part<'_>]) -> Vec<Usual> {
+    let like = whole.like_joints();
+    let all = [Joint::all(whole.joints).collect()];
+    let found: Vec<(FittedEffect, Status)> = parts.iter().flat_map(Part::found).collect();
+    let mut names: Vec<&str> = found
+        .iter()
+        .map(|(own, _)| own.effect.name.as_str())
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    let of_name = |name: &str| {
+        let own = found.iter().filter(|(own, _)| own.effect.name == name);
+        let own: Vec<&(FittedEffect, Status)> = own.collect();
+        let groups = match own[0].0.effect.alike_on {
+            AlikeOn::None => &[],
+            AlikeOn::LikeJoints => like.as_slice(),
+            AlikeOn::Commanded if whole.driven_by() == Quantity::Command => &all[..],
+            AlikeOn::Commanded => &[],
+        };
+        let groups = groups.iter();
+        groups
+            .filter_map(|group| Usual::of(group, &own))
+            .collect::<Vec<_>>()
+    };
+    let mut usual: Vec<Usual> = names.into_iter().flat_map(of_name).collect();
+    // What more joints have comes first.
+    usual.sort_by_key(|usual| std::cmp::Reverse(usual.joints.len()));
+    usual
+}
+
+impl Usual {
+    fn of(group: &[Joint], found: &[&(FittedEffect, Status)]) -> Option<Self> {
+        let mut own = found.to_vec();
+        own.retain(|(effect, _)| group.contains(&effect.joint));
+        let is_sure = own.iter().any(|(_, status)| *status == Status::Established);
+        if !is_sure || 2 * own.len() < group.len() || group.len() < 2 {
+            return None;
+        }
+        own.sort_by(|(a, _), (b, _)| a.values[0].0.total_cmp(&b.values[0].0));
+        Some(Self {
+            effect: own[own.len() / 2].0.clone(),
+            joints: group.to_vec(),
+            is_of_most: 2 * own.len() > group.len(),
+        })
+    }
+
+    /// Whether this effect may take the place of another that a joint has: it is easily confused with it, and more of the
+    /// joints have it, or it is simpler.
+    fn replaces(&self, other: &FittedEffect) -> bool {
+        let [own, other] = [&self.effect.effect, &other.effect];
+        let is_confused =
+            own.confused_with.contains(&other.name) || other.confused_with.contains(&own.name);
+        let is_simpler = own.parameters.len() < other.parameters.len();
+        is_confused && (self.is_of_most || is_simpler)
+    }
+}
+
+impl<'a> Part<'a> {
+    /// The effects that were added, on joints of the whole rig.
+    fn found(&self) -> Vec<(FittedEffect, Status)> {
+        let standings = self.searched.chosen.standings.iter();
+        let of_whole = |effect: &FittedEffect| effect.on(self.joints[effect.joint]);
+        standings
+            .map(|standing| (of_whole(&standing.effect), standing.status))
+            .collect()
+    }
+
+    /// Those of the usual effects that concern this part, on its joints.
+    fn own<'u>(&self, usual: &'u [Usual]) -> Vec<(&'u Usual, FittedEffect)> {
+        let joints = self.joints.iter().enumerate();
+        let own = joints.flat_map(|(k, joint)| {
+            let concerns = usual.iter().filter(|usual| usual.joints.contains(joint));
+            concerns.map(move |usual| (usual, usual.effect.on(Joint::at(k))))
+        });
+        own.collect()
+    }
+
+    /// The search with usual effects in place of others and beside them, if the logs agree.
+    fn agreeing(&self, usual: &[Usual], watch: &dyn Watch) -> Option<Searched<'a>> {
+        let Searched {
+            declared, chosen, ..
+        } = &self.searched;
+        let before = Trial::of(&declared.problem, chosen.after.clone());
+        let (mut trial, mut unused) = (before.clone(), Vec::new());
+        let wanted = self.own(usual);
+        for (usual, effect) in &wanted {
+            let present = &trial.fitted.model.effects;
+            if present.iter().any(|present| present.excludes(effect)) {
+                continue;
+            }
+            let is_free = |other: &FittedEffect| {
+                usual.replaces(other) && !wanted.iter().any(|(_, wanted)| wanted.is_same(other))
+            };
+            if let Some((better, other)) = self.exchanged(&trial, effect, is_free) {
+                let name = &effect.effect.name;
+                unused.push(Unused {
+                    effect: Some(other),
+                    why: format!("{name}, which like joints have, explains the logs as well"),
+                });
+                trial = better;
+            } else if let Some(better) = self.with(&trial, effect) {
+                trial = better;
+            }
+        }
+        (trial.key() != before.key()).then(|| self.searched.with(trial, unused, watch))
+    }
+
+    /// The trial with a usual effect in place of a free one on its joint, and that one, if the logs do not tell them apart.
+    fn exchanged(
+        &self,
+        trial: &Trial,
+        effect: &FittedEffect,
+        is_free: impl Fn(&FittedEffect) -> bool,
+    ) -> Option<(Trial, FittedEffect)> {
+        let problem = &self.searched.declared.problem;
+        let settings = &problem.settings.select;
+        let model = &trial.fitted.model;
+        let exchanged = |k: usize| {
+            let other = &model.effects[k];
+            if other.joint != effect.joint || !is_free(other) {
+                return None;
+            }
+            let mut effects = model.effects.clone();
+            effects[k] = effect.clone();
+            let below = trial.loss() * (1.0 + settings.simpler_rise);
+            let fitted = problem.with_better_effects(&trial.fitted, effects, below)?;
+            let found = Trial::of(problem, fitted);
+            let is_as_good = found.is_valid(problem) && found.is_as_good_as(trial, settings);
+            is_as_good.then(|| (found, other.clone()))
+        };
+        problem.added(model).find_map(exchanged)
+    }
+
+    /// The trial with a usual effect in addition, if the logs show it.
+    fn with(&self, trial: &Trial, effect: &FittedEffect) -> Option<Trial> {
+        let problem = &self.searched.declared.problem;
+        let model = &trial.fitted.model;
+        if model.effects.iter().any(|present| present.contains(effect)) {
+            return None;
+        }
+        let effects = [model.effects.as_slice(), std::slice::from_ref(effect)].concat();
+        let fitted = problem.with_better_effects(&trial.fitted, effects, trial.loss())?;
+        let found = Trial::of(problem, fitted);
+        let p = p_value(problem, &found.fitted, model.effects.len());
+        let is_shown = p.is_some_and(|p| p < problem.settings.establish.uncorrected_false_alarm);
+        (is_shown && found.is_valid(problem)).then_some(found)
+    }
+
+    /// Establish usual effects that are significant on their own: they are not one of many candidates.
+    fn confirm(&mut self, usual: &[Usual]) {
+        let own = self.own(usual);
+        let chosen = &mut self.searched.chosen;
+        let level = (self.searched.declared.problem.settings.establish).uncorrected_false_alarm;
+        for standing in &mut chosen.standings {
+            let is_usual = own
+                .iter()
+                .any(|(_, effect)| effect.is_same(&standing.effect));
+            if is_usual && standing.p_value < level && standing.gain > 0.0 {
+                standing.status = Status::Established;
+                standing.reason = None;
+            }
+        }
+    }
+}

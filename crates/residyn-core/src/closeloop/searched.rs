@@ -1,0 +1,148 @@
+//! One search for effects after another, until none explains the logs better.
+
+use rand::Rng;
+
+use super::diagnostics::{Unexplained, diagnose};
+use super::error::StudyError;
+use super::error_model::ErrorModel;
+use super::establish::{Chosen, establish};
+use super::fit::Declared;
+use super::judge::{Found, judge};
+use super::loss::Loss;
+use super::plainer::{Plainer, Unused, plainer};
+use super::select::{Selected, Trial, select, select_from};
+use super::stage::{Stage, Watch};
+use crate::data::Log;
+
+/// A search for effects, and the fit that it began with.
+pub(super) struct Searched<'a> {
+    pub declared: Declared<'a>,
+    pub chosen: Chosen,
+    /// What the chosen model leaves; `None` if it has changed since.
+    left: Option<Unexplained>,
+}
+
+impl<'a> Searched<'a> {
+    /// The best of several searches and plainer models.
+    ///
+    /// # Errors
+    /// As [`Problem::fit_declared`](super::Problem::fit_declared).
+    pub fn by(
+        declared: Declared<'a>,
+        apart: &[Log],
+        rng: &mut impl Rng,
+        watch: &dyn Watch,
+    ) -> Result<Self, StudyError> {
+        let mut best = Self::of(declared, watch);
+        if let Some(slower) = best.with_slower_reversals(watch)? {
+            best = slower;
+        }
+        watch.see(Stage::Diagnostics.into());
+        let mut left = best.diagnose(rng);
+        if (left.is_significant() || best.chosen.failure.is_some())
+            && let Some(other) = best.searched_again(watch)
+        {
+            best = other;
+            left = best.diagnose(rng);
+        }
+        best.left = Some(left);
+        while let Some(plainer) = best.plainer(apart, watch) {
+            best = plainer;
+        }
+        Ok(best)
+    }
+
+    /// Judge each effect, and test the residuals.
+    pub fn judged(self, apart: &[Log], rng: &mut impl Rng) -> Found<'a> {
+        let left = match self.left {
+            Some(left) => left,
+            None => self.diagnose(rng),
+        };
+        judge(self.declared, self.chosen, left, apart, rng)
+    }
+
+    /// The same search with another fitted set of effects in place of the chosen one, and why some are not used.
+    #[must_use]
+    pub fn with(&self, trial: Trial, unused: Vec<Unused>, watch: &dyn Watch) -> Self {
+        let Declared { problem, fitted } = &self.declared;
+        let selected = Selected {
+            chosen: Ok(trial),
+            usual: self.chosen.usual.clone(),
+            rounds: self.chosen.rounds.clone(),
+            stopped: self.chosen.stopped,
+        };
+        let chosen = Chosen {
+            unused: [self.chosen.unused.clone(), unused].concat(),
+            ..establish(problem, fitted, selected, watch)
+        };
+        Self {
+            declared: self.declared.clone(),
+            chosen,
+            left: None,
+        }
+    }
+
+    fn of(declared: Declared<'a>, watch: &dyn Watch) -> Self {
+        let Declared { problem, fitted } = &declared;
+        let selected = select(problem, fitted, watch);
+        let chosen = establish(problem, fitted, selected, watch);
+        Self {
+            declared,
+            chosen,
+            left: None,
+        }
+    }
+
+    /// The search with wider smoothing velocities, if its loss is lower.
+    fn with_slower_reversals(&self, watch: &dyn Watch) -> Result<Option<Self>, StudyError> {
+        let problem = &self.declared.problem;
+        let Some((widths, narrowest)) = problem.wider_reversal(&self.chosen.after, watch) else {
+            return Ok(None);
+        };
+        let declared = problem.with_smoothing_velocities(widths).fit_declared()?;
+        let other = Self::of(declared, watch);
+        Ok((other.loss() < narrowest).then_some(other))
+    }
+
+    /// A search that begins over short windows and from the declared values, if its loss is lower: with most of the
+    /// force missing, fits over longer windows end in minima from which no set of effects looks right, and at which
+    /// other parameters seem undetermined.
+    fn searched_again(&self, watch: &dyn Watch) -> Option<Self> {
+        let Declared { problem, fitted } = &self.declared;
+        if problem.error_model == ErrorModel::InverseDynamics || watch.has_to_end() {
+            return None;
+        }
+        let short = problem.fitted_over_short_windows().ok()?;
+        let problem = problem.knowing(short.problem.identifiability.clone());
+        let selected = select_from(&problem, &short, watch);
+        let chosen = establish(&problem, fitted, selected, watch);
+        let fitted = fitted.clone();
+        let declared = Declared { problem, fitted };
+        let other = Self {
+            declared,
+            chosen,
+            left: None,
+        };
+        (!other.chosen.standings.is_empty() && other.loss() < self.loss()).then_some(other)
+    }
+
+    /// The same search with a plainer model in place of the chosen one, if it predicts whole logs better.
+    fn plainer(&self, apart: &[Log], watch: &dyn Watch) -> Option<Self> {
+        let Declared { problem, fitted } = &self.declared;
+        let Plainer {
+            fitted: plain,
+            unused,
+        } = plainer(problem, fitted, &self.chosen, apart)?;
+        let trial = Trial::of(problem, plain);
+        Some(self.with(trial, vec![unused], watch))
+    }
+
+    fn loss(&self) -> f64 {
+        Loss::of(&self.declared.problem, &self.chosen.after).total()
+    }
+
+    fn diagnose(&self, rng: &mut impl Rng) -> Unexplained {
+        let Declared { problem, fitted } = &self.declared;
+        diagnose(problem, fitted, &self.chosen.after, rng)
+    }
+}
