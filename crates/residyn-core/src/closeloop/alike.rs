@@ -20,16 +20,17 @@ pub(super) struct Part<'a> {
 }
 
 /// An effect that at least half of some joints that are alike have.
-struct Usual {
+pub(super) struct Usual {
     /// As the joint with the median value has it.
-    effect: FittedEffect,
-    joints: Vec<Joint>,
+    pub effect: FittedEffect,
+    pub joints: Vec<Joint>,
     is_of_most: bool,
 }
 
 /// Replace and add effects where like joints have others, as far as the logs do not contradict.
 pub(super) fn agree(whole: &Model, parts: &mut [Part<'_>], watch: &dyn Watch) {
-    let usual = usual(whole, parts);
+    let found: Vec<(FittedEffect, Status)> = parts.iter().flat_map(Part::found).collect();
+    let usual = usual(whole, &found);
     if usual.is_empty() {
         return;
     }
@@ -42,10 +43,9 @@ pub(super) fn agree(whole: &Model, parts: &mut [Part<'_>], watch: &dyn Watch) {
 }
 
 /// The effects that at least half of the joints that are alike have, one of them established.
-fn usual(whole: &Model, parts: &[Part<'_>]) -> Vec<Usual> {
+pub(super) fn usual(whole: &Model, found: &[(FittedEffect, Status)]) -> Vec<Usual> {
     let like = whole.like_joints();
     let all = [Joint::all(whole.joints).collect()];
-    let found: Vec<(FittedEffect, Status)> = parts.iter().flat_map(Part::found).collect();
     let mut names: Vec<&str> = found
         .iter()
         .map(|(own, _)| own.effect.name.as_str())
@@ -88,14 +88,25 @@ impl Usual {
         })
     }
 
-    /// Whether this effect may take the place of another that a joint has: it is easily confused with it, and more of the
-    /// joints have it, or it is simpler.
-    fn replaces(&self, other: &FittedEffect) -> bool {
-        let [own, other] = [&self.effect.effect, &other.effect];
+    /// Whether an effect is this one, on one of its joints.
+    pub fn is_of(&self, effect: &FittedEffect) -> bool {
+        self.joints.contains(&effect.joint) && self.effect.effect.name == effect.effect.name
+    }
+
+    /// Whether this effect may take the place of another that one of its joints has: the two are easily confused, and more
+    /// of the joints have this one, or it is simpler; the other is not usual itself, or among fewer joints.
+    pub fn replaces(&self, other: &FittedEffect, all: &[Self]) -> bool {
+        let [own, their] = [&self.effect.effect, &other.effect];
         let is_confused =
-            own.confused_with.contains(&other.name) || other.confused_with.contains(&own.name);
-        let is_simpler = own.parameters.len() < other.parameters.len();
-        is_confused && (self.is_of_most || is_simpler)
+            own.confused_with.contains(&their.name) || their.confused_with.contains(&own.name);
+        let is_simpler = own.parameters.len() < their.parameters.len();
+        let mut as_usual = all
+            .iter()
+            .filter(|usual| usual.joints.len() >= self.joints.len());
+        self.joints.contains(&other.joint)
+            && is_confused
+            && (self.is_of_most || is_simpler)
+            && !as_usual.any(|usual| usual.is_of(other))
     }
 }
 
@@ -120,21 +131,19 @@ impl<'a> Part<'a> {
     }
 
     /// The search with usual effects in place of others and beside them, if the logs agree.
-    fn agreeing(&self, usual: &[Usual], watch: &dyn Watch) -> Option<Searched<'a>> {
+    fn agreeing(&self, all: &[Usual], watch: &dyn Watch) -> Option<Searched<'a>> {
         let Searched {
             declared, chosen, ..
         } = &self.searched;
         let before = Trial::of(&declared.problem, chosen.after.clone());
         let (mut trial, mut unused) = (before.clone(), Vec::new());
-        let wanted = self.own(usual);
-        for (usual, effect) in &wanted {
+        for (usual, effect) in &self.own(all) {
             let present = &trial.fitted.model.effects;
             if present.iter().any(|present| present.excludes(effect)) {
                 continue;
             }
-            let is_free = |other: &FittedEffect| {
-                usual.replaces(other) && !wanted.iter().any(|(_, wanted)| wanted.is_same(other))
-            };
+            let is_free =
+                |other: &FittedEffect| usual.replaces(&other.on(self.joints[other.joint]), all);
             if let Some((better, other)) = self.exchanged(&trial, effect, is_free) {
                 let name = &effect.effect.name;
                 unused.push(Unused {

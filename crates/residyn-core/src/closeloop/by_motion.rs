@@ -33,16 +33,10 @@ impl Refined<'_> {
     /// that it has not seen better than a fit to torques does. Rigs whose torques are measured stay as they are.
     pub(super) fn estimate_by_motion(&mut self) {
         let problem = &self.problem;
-        let is_of_law = problem.error_model == ErrorModel::InverseDynamics
-            && problem.declared.driven_by() == Quantity::Command;
-        if !is_of_law || self.failure.is_some() {
+        if !problem.is_by_law() || self.failure.is_some() {
             return;
         }
-        let limbs = self.after.model.limbs();
-        let limbs = limbs
-            .into_iter()
-            .map(|joints| Limb::of(problem, &[], joints));
-        let limbs: Vec<Limb> = limbs.collect();
+        let limbs = by_limbs(problem, &self.after.model);
         for fitted in [&mut self.before, &mut self.after] {
             let found = limbs.par_iter().map(|limb| {
                 let model = fitted.model.limb(limb.joints());
@@ -58,8 +52,22 @@ impl Refined<'_> {
     }
 }
 
+impl Problem<'_> {
+    /// Whether the torques that the law of drives asks for are compared.
+    pub(super) fn is_by_law(&self) -> bool {
+        self.error_model == ErrorModel::InverseDynamics
+            && self.declared.driven_by() == Quantity::Command
+    }
+}
+
+/// The limbs of a model, with the training logs.
+pub(super) fn by_limbs(problem: &Problem<'_>, model: &Model) -> Vec<Limb> {
+    let limbs = model.limbs().into_iter();
+    limbs.map(|joints| Limb::of(problem, &[], joints)).collect()
+}
+
 /// A limb's logs, compared by motion and by the torques that the law of its drives asks for.
-struct Comparison<'l> {
+pub(super) struct Comparison<'l> {
     motion: Problem<'l>,
     /// The same with friction that reverses as slowly as in the torques, so that steps may be longer.
     trial: Problem<'l>,
@@ -67,7 +75,7 @@ struct Comparison<'l> {
 }
 
 impl<'l> Comparison<'l> {
-    fn of(whole: &Problem<'l>, limb: &'l Limb) -> Self {
+    pub fn of(whole: &Problem<'l>, limb: &'l Limb) -> Self {
         let widths = of_joints(&whole.smoothing_velocities, limb.joints());
         let problem = |errors| Problem {
             held: whole.held.clone(),
@@ -96,17 +104,22 @@ impl<'l> Comparison<'l> {
         }
     }
 
+    /// The motion, for fits that end after a few steps.
+    pub fn short(&self, model: &Model) -> Problem<'l> {
+        Problem {
+            solver: &TRIAL,
+            ..stable(&self.motion, model)
+        }
+    }
+
     /// The model by motion, with intervals, if each part of the logs says that motion predicts it better.
     fn better(&self, model: &Model) -> Option<Model> {
-        let stable = |problem: &Problem<'l>| {
-            (problem.in_stable_steps(model)).unwrap_or_else(|| problem.clone())
-        };
-        let trial = stable(&self.trial);
+        let trial = stable(&self.trial, model);
         let is_better = (0..PARTS).all(|part| self.gain(&trial, model, part) > 0.0);
         if !is_better {
             return None;
         }
-        let problem = stable(&self.motion);
+        let problem = stable(&self.motion, model);
         let coarse = estimate(&problem, model).ok()?;
         let fine = problem.refined();
         let found = estimate(&fine, &coarse.model).ok()?;
@@ -129,6 +142,11 @@ impl<'l> Comparison<'l> {
     }
 }
 
+/// The same problem in steps in which the friction of a model is stable.
+fn stable<'l>(problem: &Problem<'l>, model: &Model) -> Problem<'l> {
+    (problem.in_stable_steps(model)).unwrap_or_else(|| problem.clone())
+}
+
 /// The windows of a part of the logs, and the others.
 fn parted(windows: &[Window], part: usize) -> (Vec<Window>, Vec<Window>) {
     let stretch = |k: usize| k * PARTS * STRETCHES / windows.len();
@@ -138,13 +156,13 @@ fn parted(windows: &[Window], part: usize) -> (Vec<Window>, Vec<Window>) {
     (windows(own), windows(others))
 }
 
-fn estimate(problem: &Problem<'_>, model: &Model) -> Result<Fitted, FitError> {
+pub(super) fn estimate(problem: &Problem<'_>, model: &Model) -> Result<Fitted, FitError> {
     let start_states = problem.shooting.initial_start_states(0);
     problem.refit(model, start_states, None)
 }
 
 /// Sums of the squared position errors in these windows, one per joint.
-fn squares(problem: &Problem<'_>, model: &Model, windows: &[Window]) -> Vec<f64> {
+pub(super) fn squares(problem: &Problem<'_>, model: &Model, windows: &[Window]) -> Vec<f64> {
     let (dynamics, step_s) = (model.dynamics(), problem.shooting.longest_s());
     let errors = errors_in(&dynamics, problem.logs, windows, step_s);
     let of_joint = |j: usize| errors.iter().map(|error| error.position[j]).sum();
@@ -152,7 +170,7 @@ fn squares(problem: &Problem<'_>, model: &Model, windows: &[Window]) -> Vec<f64>
 }
 
 /// The logarithm of the ratios of two such sums, on average: joints count alike, however far they move.
-fn log_ratio(own: &[f64], other: &[f64]) -> f64 {
+pub(super) fn log_ratio(own: &[f64], other: &[f64]) -> f64 {
     let of_joint = |(own, other): (&f64, &f64)| (own / other).ln();
     own.iter().zip(other).map(of_joint).sum::<f64>() / own.len() as f64
 }

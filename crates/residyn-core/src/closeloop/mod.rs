@@ -27,6 +27,7 @@ mod judge;
 mod learn;
 mod limbs;
 mod loss;
+mod names_by_motion;
 mod notes;
 mod one_way;
 mod outcome;

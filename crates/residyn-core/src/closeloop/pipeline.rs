@@ -43,6 +43,7 @@ pub fn solve(
 ) -> Result<Outcome, StudyError> {
     let declared = fit(prepared, watch)?;
     let mut found = find(declared, &prepared.test.for_fits, rng, watch)?;
+    found.decide_by_motion();
     let alternatives = discriminate(&found, watch);
     let mut refined = refine(&found, watch);
     found.chosen.confirm(&mut refined);

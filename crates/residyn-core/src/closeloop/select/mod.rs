@@ -32,4 +32,5 @@ pub(super) use self::rivals::rivals;
 pub use self::screen::screen;
 pub(super) use self::search::select_from;
 pub use self::search::{Round, Selected, Tried, select};
+pub(super) use self::simpler::parts;
 pub(super) use self::trial::Trial;

@@ -52,6 +52,14 @@ pub(super) fn repaired(
     effects.iter().flat_map(mend).collect()
 }
 
+/// The single effects that another contains, with its values: each could take its place alone.
+pub fn parts(library: &[Effect], whole: &FittedEffect) -> Vec<FittedEffect> {
+    let mut sets = parts_of(library, &whole.effect);
+    sets.retain(|set| set.len() == 1);
+    let parts = sets.concat().into_iter();
+    parts.map(|part| part_of(whole, part)).collect()
+}
+
 /// The sets of effects contained in `whole` that have fewer parameters together, fewest first.
 fn parts_of<'l>(library: &'l [Effect], whole: &Effect) -> Vec<Vec<&'l Effect>> {
     let is_part = |effect: &&Effect| whole.contains.contains(&effect.name);

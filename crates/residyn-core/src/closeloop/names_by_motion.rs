@@ -1,0 +1,157 @@
+//! Stage 5, at its end: names that the torques of drives' laws leave in doubt, decided by the motion under the commands.
+//!
+//! Torques tell a delay from a lag, or Stribeck friction from dry friction, by what a low-pass filter leaves of reversals and
+//! late commands. The motion tells by the whole. So where joints that are alike have another effect, or a simpler one
+//! would do, both are fitted to the motion, from where the torques ended.
+
+use rayon::prelude::*;
+
+use super::alike::usual;
+use super::by_motion::{Comparison, by_limbs, estimate, log_ratio, squares};
+use super::establish::Standing;
+use super::judge::{Found, mark};
+use super::limbs::Limb;
+use super::plainer::Unused;
+use super::select::{p_value, parts};
+use crate::model::{FittedEffect, Model, Status};
+
+/// An effect that another may replace.
+#[derive(Clone)]
+struct Doubt {
+    /// Its place in the model of the whole.
+    place: usize,
+    /// On the same joint.
+    instead: FittedEffect,
+    is_usual: bool,
+}
+
+impl Found<'_> {
+    /// Replace effects by what their joint's like have, or by a simpler one that they contain, where that predicts the
+    /// motion as well.
+    pub(super) fn decide_by_motion(&mut self) {
+        if !self.problem.is_by_law() {
+            return;
+        }
+        let doubts = self.doubts();
+        let model = &self.chosen.after.model;
+        let limbs = by_limbs(&self.problem, model);
+        let decided = limbs.par_iter().flat_map_iter(|limb| {
+            let is_own = |doubt: &&Doubt| limb.joints().contains(&doubt.instead.joint);
+            let own: Vec<Doubt> = doubts.iter().filter(is_own).cloned().collect();
+            self.decided(limb, model, own)
+        });
+        let decided: Vec<Doubt> = decided.collect();
+        self.replace(decided);
+    }
+
+    /// What may stand in place of the effects that were added.
+    fn doubts(&self) -> Vec<Doubt> {
+        let (problem, chosen) = (&self.problem, &self.chosen);
+        let found: Vec<(FittedEffect, Status)> = (chosen.standings.iter())
+            .map(|standing| (standing.effect.clone(), standing.status))
+            .collect();
+        let usual = usual(problem.declared, &found);
+        let present = &chosen.after.model.effects;
+        let is_free = |new: &FittedEffect| !present.iter().any(|present| present.excludes(new));
+        let of_effect = |place: usize| {
+            let own = &present[place];
+            let like = usual.iter().filter(|new| new.replaces(own, &usual));
+            let like: Vec<FittedEffect> = like.map(|usual| usual.effect.on(own.joint)).collect();
+            let mut simpler = parts(problem.effects(), own);
+            simpler.retain(|part| !like.iter().any(|like| like.is_same(part)));
+            let doubt = |instead: FittedEffect| Doubt {
+                place,
+                is_usual: usual.iter().any(|usual| usual.is_of(&instead)),
+                instead,
+            };
+            let all = like.into_iter().chain(simpler).filter(|new| is_free(new));
+            all.map(doubt).collect::<Vec<_>>()
+        };
+        problem
+            .added(&chosen.after.model)
+            .flat_map(of_effect)
+            .collect()
+    }
+
+    /// The doubts in which the motion of a limb is predicted as well by the other effect.
+    fn decided(&self, limb: &Limb, model: &Model, doubts: Vec<Doubt>) -> Vec<Doubt> {
+        let place = |of_whole: usize| {
+            let before = model.effects[..of_whole].iter();
+            before
+                .filter(|effect| limb.joints().contains(&effect.joint))
+                .count()
+        };
+        if doubts.is_empty() {
+            return doubts;
+        }
+        let own = model.limb(limb.joints());
+        let trial = Comparison::of(&self.problem, limb).short(&own);
+        let Ok(first) = estimate(&trial, &own) else {
+            return Vec::new();
+        };
+        let error = |model: &Model| squares(&trial, model, &trial.shooting.windows);
+        let (mut best, mut least) = (first.model.clone(), error(&first.model));
+        let rise = (self.problem.settings.select.negligible_rise).ln_1p();
+        let mut decided: Vec<Doubt> = Vec::new();
+        for doubt in doubts {
+            if decided.iter().any(|known| known.place == doubt.place) {
+                continue;
+            }
+            let mut other = best.clone();
+            let joint = other.effects[place(doubt.place)].joint;
+            other.effects[place(doubt.place)] = doubt.instead.on(joint);
+            let Ok(other) = estimate(&trial, &other) else {
+                continue;
+            };
+            let found = error(&other.model);
+            eprintln!(
+                "DBG {} -> {}: {:.4} loss {:?}",
+                doubt.place,
+                doubt.instead.label(),
+                log_ratio(&found, &least),
+                found
+                    .iter()
+                    .zip(&least)
+                    .map(|(a, b)| format!("{:.3e}/{:.3e}", a, b))
+                    .collect::<Vec<_>>()
+            );
+            if log_ratio(&found, &least) < rise {
+                (best, least) = (other.model, found);
+                decided.push(doubt);
+            }
+        }
+        decided
+    }
+
+    /// Put the other effects into the chosen set, if it can be fitted with them.
+    fn replace(&mut self, decided: Vec<Doubt>) {
+        let (problem, chosen) = (&self.problem, &mut self.chosen);
+        let mut effects = chosen.after.model.effects.clone();
+        for doubt in &decided {
+            effects[doubt.place] = doubt.instead.clone();
+        }
+        if decided.is_empty() {
+            return;
+        }
+        let Ok(after) = problem.with_effects(&chosen.after, effects) else {
+            return;
+        };
+        let declared = problem.declared.effects.len();
+        let level = problem.settings.establish.uncorrected_false_alarm;
+        for doubt in &decided {
+            let standing: &mut Standing = &mut chosen.standings[doubt.place - declared];
+            let new = &doubt.instead.effect.name;
+            chosen.unused.push(Unused {
+                effect: Some(standing.effect.clone()),
+                why: format!("{new} predicts the motion under the commands as well"),
+            });
+            let is_shown = p_value(problem, &after, doubt.place).is_some_and(|p| p < level);
+            standing.effect = after.model.effects[doubt.place].clone();
+            if doubt.is_usual && is_shown {
+                (standing.status, standing.reason) = (Status::Established, None);
+            }
+        }
+        chosen.after = after;
+        mark(&mut chosen.after.model, &chosen.standings);
+    }
+}
