@@ -33,6 +33,7 @@ mod gradients;
 mod identify;
 mod interrupts;
 mod layout;
+mod like_joints;
 mod log_formats;
 mod logs;
 mod many_joints;

@@ -38,6 +38,7 @@ impl Refined<'_> {
         }
         let limbs = by_limbs(problem, &self.after.model);
         for fitted in [&mut self.before, &mut self.after] {
+            self.by_motion.clear();
             let found = limbs.par_iter().map(|limb| {
                 let model = fitted.model.limb(limb.joints());
                 Comparison::of(problem, limb).better(&model)
@@ -46,6 +47,7 @@ impl Refined<'_> {
             for (limb, found) in limbs.iter().zip(found) {
                 if let Some(found) = found {
                     limb.put_into(&mut fitted.model, &found);
+                    self.by_motion.push(limb.joints().to_vec());
                 }
             }
         }
@@ -102,6 +104,11 @@ impl<'l> Comparison<'l> {
                 .over(shooting.near(torques.declared)),
             motion,
         }
+    }
+
+    /// The motion in fine steps.
+    pub fn fine(&self, model: &Model) -> Problem<'l> {
+        stable(&self.motion, model).refined()
     }
 
     /// The motion, for fits that end after a few steps.

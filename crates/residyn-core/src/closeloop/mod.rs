@@ -48,6 +48,7 @@ mod stage;
 mod start;
 #[cfg(test)]
 mod tests;
+mod tie;
 mod torque_column;
 mod torque_sign;
 mod verdict;

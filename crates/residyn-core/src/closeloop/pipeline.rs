@@ -46,8 +46,9 @@ pub fn solve(
     found.decide_by_motion();
     let alternatives = discriminate(&found, watch);
     let mut refined = refine(&found, watch);
-    found.chosen.confirm(&mut refined);
     refined.estimate_by_motion();
+    refined.tie();
+    found.chosen.confirm(&mut refined);
     let diagnostics = Diagnostics::of(&found, &refined);
     let with_friction = found.problem.with_usual_friction();
     let noted = noted(

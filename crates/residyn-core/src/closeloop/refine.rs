@@ -7,6 +7,7 @@ use super::fitted::Fitted;
 use super::judge::Found;
 use super::problem::Problem;
 use super::stage::{Stage, Watch};
+use crate::data::Joint;
 use crate::identify::{
     FitError, Identifiability, IdentifiableBodies, Uncertainty, Values, identifiable_bodies,
     uncertainty,
@@ -30,6 +31,8 @@ pub struct Refined<'a> {
     pub uncertainty: Uncertainty,
     /// Why the steps are not fine, if they are not.
     pub failure: Option<FitError>,
+    /// The limbs whose motion told more than the torques, by which the rest was estimated.
+    pub by_motion: Vec<Vec<Joint>>,
 }
 
 /// Estimate the declared and the chosen model in fine steps or, for torques, with the noise that the chosen model
@@ -77,6 +80,7 @@ pub(super) fn refined<'a>(
         after,
         identifiability,
         failure,
+        by_motion: Vec::new(),
     }
 }
 

@@ -18,7 +18,7 @@ const LIMBS: [&str; 29] = [
 ///
 /// `names` holds one name per joint, in order, or nothing for a rig without names. Each group has at least two joints, in
 /// order; groups are in the order of their first joints, and joints that are like no other are in none.
-fn of_names(names: &[String]) -> Vec<Vec<Joint>> {
+pub(super) fn of_names(names: &[String]) -> Vec<Vec<Joint>> {
     let mut groups: Vec<(String, Vec<Joint>)> = Vec::new();
     for (joint, name) in Joint::all(names.len()).zip(names) {
         let Some(role) = role(name) else {

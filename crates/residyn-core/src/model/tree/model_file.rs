@@ -12,6 +12,7 @@ use super::equations::Kind;
 use super::formula::number;
 use super::series::{LONGEST_CLOSED_FORM, rounded};
 use crate::data;
+use crate::model::like::of_names;
 use crate::model::ready_drive::{hold, write_plain};
 use crate::model::{Library, ReadyDrive};
 
@@ -109,6 +110,7 @@ fn head(tree: &Tree) -> String {
     // In MJCF, joints need not have names.
     if names.iter().collect::<HashSet<_>>().len() == names.len() {
         let _ = writeln!(text, "joint_names = [{}]", names.join(", "));
+        text += &proposed_like(tree);
     }
     let slides: Vec<String> = tree
         .leaders()
@@ -119,6 +121,29 @@ fn head(tree: &Tree) -> String {
         let _ = writeln!(text, "prismatic = [{}]", slides.join(", "));
     }
     text
+}
+
+/// Which joints are built alike as their names say, as a line for the user to take: logs are to decide what they share only
+/// where the user wants them to.
+fn proposed_like(tree: &Tree) -> String {
+    let names: Vec<String> = tree
+        .leaders()
+        .map(|(_, joint)| joint.name.clone())
+        .collect();
+    let groups = of_names(&names);
+    let group = |group: &Vec<data::Joint>| {
+        let quoted: Vec<String> = group.iter().map(|joint| quoted(&names[*joint])).collect();
+        format!("[{}]", quoted.join(", "))
+    };
+    let groups: Vec<String> = groups.iter().map(group).collect();
+    match groups.is_empty() {
+        true => String::new(),
+        false => format!(
+            "# These joints look alike; without the # they share friction, rotors, gains and delays unless the logs contradict:\n\
+             # like = [{}]\n",
+            groups.join(", ")
+        ),
+    }
 }
 
 /// `zz_1`
