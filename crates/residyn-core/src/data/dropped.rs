@@ -109,7 +109,9 @@ impl Log {
                 interpolated(time, q, around, between(time, row, share))
             });
         }
-        for channel in self.qd.iter_mut().chain(&mut self.tau) {
+        let measured = self.measured.iter_mut().map(|measured| &mut measured.values);
+        let others = self.qd.iter_mut().chain(&mut self.tau).chain(measured);
+        for channel in others {
             *channel = with_rows(channel, missing, |row, share| between(channel, row, share));
         }
         self.time = with_rows(time, missing, |row, share| between(time, row, share));

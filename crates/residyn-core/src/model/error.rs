@@ -34,6 +34,12 @@ pub enum ModelError {
     /// The effect is part of the inertia, which the model does not give.
     #[error("`{effect}` needs a model that gives `mass` and `bias`; {model} gives accelerations")]
     NeedsMass { effect: String, model: String },
+    /// The effect depends on a measured column that the model does not declare.
+    #[error(
+        "`{effect}` uses the measured column `{column}`, which the model file does not declare; add the table [measured] \
+         with {column} = \"UNIT\", such as \"V\" or \"K\""
+    )]
+    NotMeasured { effect: String, column: String },
     /// The model already has this effect, or one that excludes it, on the joint.
     #[error("`{effect}` already acts on joint {joint}")]
     Twice { effect: String, joint: Joint },
