@@ -36,6 +36,7 @@ mod layout;
 mod log_formats;
 mod logs;
 mod many_joints;
+mod measured_columns;
 mod mechanism;
 mod memory;
 mod metric;

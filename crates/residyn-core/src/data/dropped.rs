@@ -109,7 +109,10 @@ impl Log {
                 interpolated(time, q, around, between(time, row, share))
             });
         }
-        let measured = self.measured.iter_mut().map(|measured| &mut measured.values);
+        let measured = self
+            .measured
+            .iter_mut()
+            .map(|measured| &mut measured.values);
         let others = self.qd.iter_mut().chain(&mut self.tau).chain(measured);
         for channel in others {
             *channel = with_rows(channel, missing, |row, share| between(channel, row, share));

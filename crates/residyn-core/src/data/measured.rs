@@ -7,6 +7,10 @@ use crate::expr::listed;
 /// What their names begin with, in logs and in formulas.
 pub const MEASURED_PREFIX: &str = "u_";
 
+/// What such a column reads where no log says it, in its unit: a matrix is looked at in some state, an effect is compared
+/// with its mirror image.
+pub(crate) const NOMINAL: f64 = 1.0;
+
 /// Whether a name is that of such a column.
 pub fn is_measured(name: &str) -> bool {
     name.len() > MEASURED_PREFIX.len() && name.starts_with(MEASURED_PREFIX)
@@ -32,7 +36,9 @@ impl Measured {
     ) -> Vec<&'m Vec<f64>> {
         let find = |name| {
             let found = all.iter().find(|measured| measured.name == name);
-            &found.expect("logs have the measured columns of the model").values
+            &found
+                .expect("logs have the measured columns of the model")
+                .values
         };
         names.into_iter().map(find).collect()
     }
@@ -53,6 +59,21 @@ impl Log {
             None => Ok(()),
             Some(name) => Err(self.lacks(name)),
         }
+    }
+
+    /// Its measured columns, without rows.
+    pub(crate) fn empty_measured(&self) -> Vec<Measured> {
+        let empty = |measured: &Measured| Measured {
+            name: measured.name.clone(),
+            values: Vec::new(),
+        };
+        self.measured.iter().map(empty).collect()
+    }
+
+    /// What its measured columns read at a row.
+    pub(crate) fn measured_at(&self, row: usize) -> Vec<f64> {
+        let measured = self.measured.iter();
+        measured.map(|measured| measured.values[row]).collect()
     }
 
     fn lacks(&self, name: &str) -> LogError {

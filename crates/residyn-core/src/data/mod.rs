@@ -56,6 +56,7 @@ pub use leave_out::{LeaveOut, LeaveOutError};
 pub(crate) use local_cubic::rows_around;
 pub use local_cubic::{LocalCubic, half_width_s, local_cubic};
 pub use log::{Interval, Log};
+pub(crate) use measured::NOMINAL;
 pub use measured::{MEASURED_PREFIX, Measured, is_measured};
 pub use smooth::{Smooth, Smoothing};
 pub use table::{Arrays, Numbers, Numeric, Table};

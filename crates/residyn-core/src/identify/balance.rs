@@ -64,7 +64,9 @@ impl Acting {
                 None => tau.clone(),
             });
             let measured = Measured::named(&rows.smooth.measured, dynamics.measured_names());
-            acting.given.push(tau.chain(measured.into_iter().cloned()).collect());
+            acting
+                .given
+                .push(tau.chain(measured.into_iter().cloned()).collect());
             let slopes = dynamics.filters.iter().map(|filter| {
                 let means = filtered[filter.joint].as_ref();
                 let means = means.expect("the joint has a filter");

@@ -18,7 +18,8 @@ const STABLE_SHARE: f64 = 0.7;
 pub fn longest_stable_step(shooting: &Shooting<'_>, dynamics: &Dynamics) -> f64 {
     let values = Values::of(dynamics, shooting.logs);
     let tangent = Tangent::new(dynamics, &[], Local::State);
-    let of_some = |windows: &[Window]| fastest_decay(shooting, &tangent, &values, dynamics, windows);
+    let of_some =
+        |windows: &[Window]| fastest_decay(shooting, &tangent, &values, dynamics, windows);
     let fastest = shooting.windows.chunks(LANES).map(of_some);
     STABLE_SHARE * RK4.most_damping / fastest.fold(0.0, f64::max)
 }

@@ -28,7 +28,10 @@ pub(super) fn columns(
     let of_joints = [Quantity::Angle, Quantity::Velocity, driven_by];
     let [q, qd, driven] = of_joints.map(Quantity::key);
     let own = quantities.iter().map(|quantity| quantity.name.as_str());
-    let known: Vec<&str> = ["topic", "time", q, qd, driven].into_iter().chain(own).collect();
+    let known: Vec<&str> = ["topic", "time", q, qd, driven]
+        .into_iter()
+        .chain(own)
+        .collect();
     section.only(&known)?;
     let time = section.read::<Option<Entry<'_>>>("time")?;
     let time = time

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use super::assemble::lower;
 use super::error::ModelError;
 use super::filter::CommandFilter;
-use crate::data::is_measured;
+use crate::data::{NOMINAL, is_measured};
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm, suggestion};
 
 /// Names that an effect's formula may mention besides its parameters.
@@ -21,9 +21,6 @@ pub(super) const PLACE: [&str; 3] = ["x", "y", "z"];
 /// N): typical values are for desktop rigs.
 const COMMANDS: i32 = 60;
 const COMMAND_STEP: f64 = 0.05;
-
-/// Measured columns are at this value where an effect is compared with itself, whatever they read.
-const NOMINAL: f64 = 1.0;
 
 /// Angle, speed, torque and load at which an effect is compared with its mirror image.
 const MIRRORED: [[f64; 4]; 3] = [

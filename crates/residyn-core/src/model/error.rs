@@ -40,6 +40,16 @@ pub enum ModelError {
          with {column} = \"UNIT\", such as \"V\" or \"K\""
     )]
     NotMeasured { effect: String, column: String },
+    /// Something that has no log runs a model that reads a measured column.
+    #[error(
+        "{model} reads the measured column `{column}` of logs, and {what} has no such column; put a parameter with its usual \
+         value in its place, `fixed = true`, and remove it from [measured]"
+    )]
+    ReadsMeasured {
+        model: String,
+        column: String,
+        what: &'static str,
+    },
     /// The model already has this effect, or one that excludes it, on the joint.
     #[error("`{effect}` already acts on joint {joint}")]
     Twice { effect: String, joint: Joint },

@@ -53,7 +53,13 @@ impl Model {
             columns: Columns {
                 slides: prismatic.clone(),
                 torque: file.log.and_then(|log| log.torque),
-                ..columns(file.columns, joints, driven_by, &system.joint_names, &measured)?
+                ..columns(
+                    file.columns,
+                    joints,
+                    driven_by,
+                    &system.joint_names,
+                    &measured,
+                )?
             },
             measured,
             joint_names: system.joint_names,

@@ -46,9 +46,9 @@ pub use error::ModelError;
 pub use filter::{CommandFilter, Filter};
 pub use fitted::{FittedEffect, Status};
 pub use input_layout::InputLayout;
-pub use measured_in_file::MeasuredQuantity;
 pub use library::Library;
 pub use like::like_joints;
+pub use measured_in_file::MeasuredQuantity;
 pub use network::to_f32;
 pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,

@@ -123,6 +123,22 @@ impl Model {
         self.measured.iter().map(|quantity| quantity.name.as_str())
     }
 
+    /// Refuses a model that reads further measured columns, for what runs it without a log: `what`, such as "an exported
+    /// file".
+    ///
+    /// # Errors
+    /// The first column that it reads.
+    pub fn runs_without_logs(&self, what: &'static str) -> Result<(), ModelError> {
+        match self.measured_names().next() {
+            None => Ok(()),
+            Some(column) => Err(ModelError::ReadsMeasured {
+                model: self.name.clone(),
+                column: column.to_owned(),
+                what,
+            }),
+        }
+    }
+
     /// Places of the inputs of the model's programs.
     pub(super) fn layout(&self) -> InputLayout {
         InputLayout::of(self.joints).with_measured(self.measured.len())
