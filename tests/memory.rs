@@ -48,7 +48,7 @@ fn means(model: &Dynamics, from: f64, to: f64, parts: usize) -> (Vec<f64>, Vec<f
     let (held, ends) = ([Row([f64::NAN])], [from, to].map(|time| Row([time])));
     let torque = StepTorque::new(&Hold::between([&commands], &held, ends, parts));
     let first = |lanes: Vec<Row<f64, 1>>| lanes.into_iter().map(|lane| lane[0]).collect();
-    (first(torque.mean), first(torque.slopes))
+    (first(torque.given), first(torque.slopes))
 }
 
 /// The filtered torque in steps of 1 us, averaged over each part.

@@ -37,6 +37,7 @@ mod like_joints;
 mod log_formats;
 mod logs;
 mod many_joints;
+mod measured_columns;
 mod mechanism;
 mod memory;
 mod metric;

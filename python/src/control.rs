@@ -66,10 +66,11 @@ pub enum Planned<'py> {
 impl Planned<'_> {
     fn predictor(&self, task: &Task) -> PyResult<Predictor> {
         match self {
-            Self::Model(model) => Ok(Predictor::of_equations(
-                model.inner.dynamics(),
-                task.integrator,
-            )),
+            Self::Model(model) => {
+                model.inner.runs_without_logs("a planner").or_raise()?;
+                let dynamics = model.inner.dynamics();
+                Ok(Predictor::of_equations(dynamics, task.integrator))
+            }
             Self::Checkpoint(folder) => {
                 let (checkpoint, _, trained) =
                     Checkpoint::open(folder, &Library::built_in(), Backend::default())

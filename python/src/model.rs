@@ -401,6 +401,7 @@ impl Model {
         }
         let integrator = integrator_of(integrator)?;
         check_seconds("step", step_s)?;
+        self.inner.runs_without_logs("a simulation").or_raise()?;
         let dynamics = self.inner.dynamics();
         let mut environment = Environment::new(&dynamics, integrator, step_s);
         let mut states: Vec<Vec<f64>> = state.iter().map(|value| vec![*value]).collect();

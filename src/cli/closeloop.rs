@@ -128,6 +128,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     request.learner = Some(&learner);
     request.error_model = arguments.errors.map(ErrorModel::from);
     request.horizons_s = Some(arguments.horizon.clone()).filter(|given| !given.is_empty());
+    request.check_measured()?;
     let prepared = prepare(request, &stages);
     stages.beside(|| inputs::print_faults(prepared.audits()));
     let mut outcome = solve(&prepared, &mut rng, &stages)?;

@@ -207,8 +207,9 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
             Ok(model.predictor(integrator))
         }
         Source::File(file) => {
-            let dynamics = read_model(file, library)?.dynamics();
-            Ok(Predictor::of_equations(dynamics, task.integrator))
+            let model = read_model(file, library)?;
+            model.runs_without_logs("a planner")?;
+            Ok(Predictor::of_equations(model.dynamics(), task.integrator))
         }
     }
 }

@@ -158,6 +158,7 @@ fn write_into(arguments: &Arguments, file: &Path) -> Result<Answer> {
         unreachable!("clap refuses a checkpoint beside --into");
     };
     let model = read_model(model, &arguments.effects.library()?)?;
+    model.runs_without_logs("a robot description")?;
     let WrittenBack { text, not_carried } = write_back(&model, file, arguments.tip.as_deref())?;
     prepare(arguments, &not_carried)?;
     write_whole(&arguments.out, text.as_bytes())?;
@@ -211,10 +212,12 @@ fn portable(arguments: &Arguments) -> Result<ExportModel> {
         bail!("--step {step}: a step is a number of seconds above zero");
     }
     let library = arguments.effects.library()?;
-    match arguments.model.source() {
-        Source::Checkpoint(dir) => of_checkpoint(arguments, dir, &library),
-        Source::File(file) => of_file(arguments, file, &library),
-    }
+    let model = match arguments.model.source() {
+        Source::Checkpoint(dir) => of_checkpoint(arguments, dir, &library)?,
+        Source::File(file) => of_file(arguments, file, &library)?,
+    };
+    model.check_measured()?;
+    Ok(model)
 }
 
 fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result<ExportModel> {

@@ -146,7 +146,7 @@ fn of_study(error: &StudyError) -> Option<&'static str> {
         StudyError::NotOfMotion => {
             Some("leave --calibrate out, or compare the motion with --errors motion")
         }
-        StudyError::TooManyParameters { .. } | StudyError::Fit(_) => None,
+        StudyError::TooManyParameters { .. } | StudyError::Log(_) | StudyError::Fit(_) => None,
     }
 }
 

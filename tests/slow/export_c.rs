@@ -345,7 +345,7 @@ fn filtered_torques_are_exact_for_steps_of_any_length() {
         for (k, row) in rows.iter().enumerate() {
             let held: Vec<_> = tau.iter().map(|tau| Row([tau[k + 1]])).collect();
             let ends = [time[k + 1], time[k + 2]].map(|time| Row([time]));
-            let acting = StepTorque::new(&Hold::between([&commands], &held, ends, parts)).mean;
+            let acting = StepTorque::new(&Hold::between([&commands], &held, ends, parts)).given;
             for (a, Row([b])) in row.iter().zip(acting) {
                 assert!((a - b).abs() < 1e-9, "{} step {k}: {a} {b}", header.name);
             }

@@ -9,7 +9,8 @@ use super::verify::{Predictions, ReferenceModel, Samples, draw};
 use residyn_core::data::{Joint, Quantity};
 use residyn_core::expr::{Op, Program};
 use residyn_core::model::{
-    CommandFilter, Dynamics, MlpWeights, Model, ModelWeights, NetworkError, Parameter, nothing_but,
+    CommandFilter, Dynamics, MlpWeights, Model, ModelError, ModelWeights, NetworkError, Parameter,
+    nothing_but,
 };
 use residyn_core::sim::Integrator;
 
@@ -98,6 +99,14 @@ impl ExportModel {
             task: None,
             origin,
         }
+    }
+
+    /// Refuses a model that reads further measured columns: whoever steps an exported file gives it states and torques.
+    ///
+    /// # Errors
+    /// The first column that it reads.
+    pub fn check_measured(&self) -> Result<(), ModelError> {
+        self.system.runs_without_logs("an exported file")
     }
 
     /// The same model with a task.

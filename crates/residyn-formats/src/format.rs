@@ -12,7 +12,9 @@ use super::xml::{self, Source};
 use residyn_core::data::Joint;
 use residyn_core::limits::DELAY_STEPS;
 use residyn_core::model::tree::{Tree, model_text};
-use residyn_core::model::{CommandFilter, FileError, Library, Model, NetworkError, ReadyDrive};
+use residyn_core::model::{
+    CommandFilter, FileError, Library, Model, ModelError, NetworkError, ReadyDrive,
+};
 use residyn_io::files::{OutputError, write_whole};
 
 /// A format of other programs.
@@ -149,6 +151,8 @@ pub enum ExportError {
     Write(#[from] OutputError),
     #[error(transparent)]
     Hybrid(#[from] NetworkError),
+    #[error(transparent)]
+    Measured(#[from] ModelError),
 }
 
 impl File {
@@ -165,8 +169,10 @@ impl Format {
     /// Write the model. All files are made in memory first; then each appears whole or not at all.
     ///
     /// # Errors
-    /// A model that the format cannot carry, or a folder that cannot be written.
+    /// A model that the format cannot carry, such as any that reads further measured columns, or a folder that cannot be
+    /// written.
     pub fn write(&self, model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
+        model.check_measured()?;
         self.check_delays(model)?;
         let files = (self.files)(model, path)?;
         for file in &files {

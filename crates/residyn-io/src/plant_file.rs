@@ -13,16 +13,16 @@ use crate::model_file::read_model;
 /// are looked for next to it.
 ///
 /// # Errors
-/// Unreadable file, unknown key, parameter or effect; messages name place and remedy.
+/// Unreadable file, unknown key, parameter or effect, a model that reads measured columns; messages name place and
+/// remedy.
 pub fn read_plant(path: &Path, library: &Library) -> Result<Plant, PlantError> {
-    match text_or_embedded(path, Plant::embedded) {
-        Ok(text) if Plant::is_one(&text) => plant_from_text(path, &text, library),
+    let plant = match text_or_embedded(path, Plant::embedded) {
+        Ok(text) if Plant::is_one(&text) => plant_from_text(path, &text, library)?,
         // A model file, or one that cannot be read, for which the model's reader has the error message.
-        _ => {
-            let model = read_model(path, library).map_err(or_a_plant)?;
-            Ok(Plant::of_system(model))
-        }
-    }
+        _ => Plant::of_system(read_model(path, library).map_err(or_a_plant)?),
+    };
+    plant.check_measured()?;
+    Ok(plant)
 }
 
 /// The plant in a text, as if the text stood in a file at `path`.

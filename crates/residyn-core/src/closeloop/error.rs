@@ -1,5 +1,6 @@
 use thiserror::Error;
 
+use crate::data::LogError;
 use crate::identify::FitError;
 use crate::limits::FITTED_PARAMETERS;
 
@@ -25,6 +26,9 @@ pub enum StudyError {
          ones `fixed = true`"
     )]
     TooManyParameters { model: String, free: usize },
+    /// A log lacks a measured column that the model reads.
+    #[error("{0}")]
+    Log(#[from] LogError),
     #[error("{0}")]
     Fit(#[from] FitError),
 }

@@ -48,6 +48,7 @@ pub(super) fn noted(
     problem.report_reversed(usual, &mut of_train);
     report_gravity(&found.gravity, settings, &mut of_train);
     report_too_many(problem, &mut of_train);
+    report_measured(problem, &mut of_train);
     report_drive_gain(problem.declared, &refined.after.model, &mut of_train);
     // Logs on which the model diverges cannot show external forces.
     let residual = diagnostics.after.as_ref().ok();
@@ -88,6 +89,31 @@ fn report_unmatched(declared: &Model, prepared: &Prepared<'_>, audits: &mut [Aud
         if let Some(audit) = audits.first_mut() {
             audit.add(Finding::new(Severity::Warning, text));
         }
+    }
+}
+
+/// Report in the first log's audit what is not looked for because of further measured columns: effects that read some
+/// that the model does not declare, and the residual network.
+fn report_measured(problem: &Problem<'_>, audits: &mut [Audit]) {
+    let Some(audit) = audits.first_mut() else {
+        return;
+    };
+    let own: Vec<&str> = problem.declared.measured_names().collect();
+    for effect in problem.library.effects() {
+        if let Some(column) = effect.measured().find(|name| !own.contains(name)) {
+            let text = format!(
+                "{} is not searched for: it reads `{column}`, which the model file does not declare under [measured]",
+                effect.name
+            );
+            audit.add(Finding::new(Severity::Warning, text));
+        }
+    }
+    if !own.is_empty() {
+        let text = format!(
+            "no residual network is trained: networks read states and torques alone, and the model reads {}",
+            own.join(", ")
+        );
+        audit.add(Finding::new(Severity::Info, text));
     }
 }
 

@@ -23,12 +23,14 @@ use crate::data::{Joint, Log};
 /// network on what is left, and score the models before and after on the test logs.
 ///
 /// # Errors
-/// Logs without a usable window, or a declared model that diverges from its starting values.
+/// Logs without a usable window, logs that lack a measured column, or a declared model that diverges from its starting
+/// values.
 pub fn close_loop(
     request: Request<'_>,
     rng: &mut impl Rng,
     watch: &dyn Watch,
 ) -> Result<Outcome, StudyError> {
+    request.check_measured()?;
     solve(&prepare(request, watch), rng, watch)
 }
 

@@ -84,7 +84,8 @@ pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> 
         unscored_s,
         error_model: request.error_model,
         solver: request.solver,
-        learner: request.learner,
+        // Networks read states and torques alone.
+        learner: (request.learner).filter(|_| model.measured.is_empty()),
         settings,
     }
     .with_known_torques()

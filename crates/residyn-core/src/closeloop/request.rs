@@ -2,7 +2,7 @@ use super::error_model::ErrorModel;
 use super::learn::ResidualLearner;
 use super::settings::Settings;
 use super::split::Split;
-use crate::data::Log;
+use crate::data::{Log, LogError};
 use crate::identify::{LevenbergMarquardt, Solver};
 use crate::model::{Library, Model};
 
@@ -71,6 +71,25 @@ impl<'a> Request<'a> {
             solver: &LevenbergMarquardt::USUAL,
             learner: None,
         }
+    }
+
+    /// Whether all logs have the further measured columns that the models read, for logs that were not read with the
+    /// declared model's columns.
+    ///
+    /// # Errors
+    /// The first column that one lacks.
+    pub fn check_measured(&self) -> Result<(), LogError> {
+        let logs: Vec<&Log> = match &self.logs {
+            Logs::Together(logs) => logs.iter().collect(),
+            Logs::Divided(split) => split.train.iter().chain(&split.test).collect(),
+        };
+        let references = self.against.iter().map(|reference| &reference.model);
+        for model in [self.model].into_iter().chain(references) {
+            for log in &logs {
+                log.check_measured(model.measured_names())?;
+            }
+        }
+        Ok(())
     }
 
     /// Divide the logs as the settings say, if the user has not done so.

@@ -15,6 +15,8 @@ pub enum Quantity {
     Torque,
     /// Command of a drive that turns it into a torque: a position target, volts, a duty cycle, amperes.
     Command,
+    /// Something else that the rig measures: a supply voltage, a temperature.
+    Measured,
 }
 
 /// A unit and its size in the channel's own unit.
@@ -29,6 +31,7 @@ impl Quantity {
             Self::Velocity => "qd",
             Self::Torque => "tau",
             Self::Command => "cmd",
+            Self::Measured => "u",
         }
     }
 
@@ -64,6 +67,16 @@ impl Quantity {
                 ("mV", 1e-3),
                 ("A", 1.0),
                 ("mA", 1e-3),
+                ("%", 1e-2),
+            ],
+            Self::Measured => &[
+                ("V", 1.0),
+                ("mV", 1e-3),
+                ("A", 1.0),
+                ("mA", 1e-3),
+                ("K", 1.0),
+                ("Pa", 1.0),
+                ("1", 1.0),
                 ("%", 1e-2),
             ],
         }

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::column::{Column, Quantity};
 use super::error::{LogError, Place};
 use super::joint::{Joint, of_joints};
+use super::measured::is_measured;
 use super::named_columns;
 use super::torque_column::TorqueColumn;
 use crate::expr::listed;
@@ -24,6 +25,8 @@ pub struct Columns {
     pub tau: Vec<Column>,
     /// Which of the two they are: [`Quantity::Torque`] or [`Quantity::Command`].
     pub driven_by: Quantity,
+    /// Further measured columns that formulas of the model may use.
+    pub measured: Vec<MeasuredColumn>,
     /// What the torques are, if it is known.
     pub torque: Option<TorqueColumn>,
     /// The topic of a recording that has the joints; `None` if their names determine it.
@@ -35,6 +38,15 @@ pub struct Columns {
     pub slides: Vec<bool>,
 }
 
+/// A measured column beside those of the joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredColumn {
+    /// As formulas call it: `u_volts`.
+    pub name: String,
+    /// Where it stands in the log.
+    pub column: Column,
+}
+
 impl Default for Columns {
     /// `time`, and the standard names for however many joints the model has.
     fn default() -> Self {
@@ -44,6 +56,7 @@ impl Default for Columns {
             qd: Some(vec![]),
             tau: vec![],
             driven_by: Quantity::Torque,
+            measured: vec![],
             torque: None,
             topic: None,
             joint_names: vec![],
@@ -77,7 +90,8 @@ impl Columns {
         }
     }
 
-    /// The unit of a joint's angle or length, velocity, or torque or force; none for a command.
+    /// The unit of a joint's angle or length, velocity, or torque or force; none for a command, nor for what is not a
+    /// joint's.
     pub(crate) fn unit(&self, quantity: Quantity, joint: Joint) -> &'static str {
         let slides = self.slides.get(joint.index()).copied().unwrap_or(false);
         let [of_turning, of_sliding] = match quantity {
@@ -85,18 +99,19 @@ impl Columns {
             Quantity::Angle => ["rad", "m"],
             Quantity::Velocity => ["rad/s", "m/s"],
             Quantity::Torque => ["N m", "N"],
-            Quantity::Command => ["", ""],
+            Quantity::Command | Quantity::Measured => ["", ""],
         };
         if slides { of_sliding } else { of_turning }
     }
 
-    /// The columns of a quantity, one for each joint except for the time.
+    /// The columns of a quantity, one for each joint except for the time; measured columns are of no joint.
     fn of(&self, quantity: Quantity) -> &[Column] {
         match quantity {
             Quantity::Time => std::slice::from_ref(&self.time),
             Quantity::Angle => &self.q,
             Quantity::Velocity => self.qd.as_deref().unwrap_or_default(),
             Quantity::Torque | Quantity::Command => &self.tau,
+            Quantity::Measured => &[],
         }
     }
 
@@ -106,14 +121,17 @@ impl Columns {
             Quantity::Angle => &mut self.q,
             Quantity::Velocity => self.qd.as_deref_mut().unwrap_or_default(),
             Quantity::Torque | Quantity::Command => &mut self.tau,
+            Quantity::Measured => &mut [],
         }
     }
 
-    /// All columns: time, angles, velocities, torques.
+    /// All columns: time, angles, velocities, torques, further measured ones.
     pub(crate) fn in_file_order(&self) -> impl Iterator<Item = &Column> {
         let quantities = [Quantity::Time, Quantity::Angle, Quantity::Velocity];
         let all = quantities.into_iter().chain([self.driven_by]);
+        let measured = self.measured.iter().map(|measured| &measured.column);
         all.flat_map(move |quantity| self.of(quantity))
+            .chain(measured)
     }
 
     /// The line of a model file under `[columns]` for one of the quantities: `tau = [{ column = "tau1", factor = -1 }]`.
@@ -238,15 +256,27 @@ pub(super) struct Layout {
     pub qd: Option<Vec<Cell>>,
     /// `None` for the log of a passive rig, which has no torque columns, and for a joint without a drive.
     pub tau: Option<Vec<Option<Cell>>>,
+    /// The further measured columns that the model needs, in its order, then those that it does not mention.
+    pub measured: Vec<MeasuredCell>,
     /// Names of the columns that nothing reads.
     pub ignored: Vec<String>,
 }
 
+/// Where a further measured column stands in a row.
+#[derive(Debug, PartialEq)]
+pub(super) struct MeasuredCell {
+    pub name: String,
+    pub cell: Cell,
+    pub is_needed: bool,
+}
+
 impl Layout {
-    /// The channels: angles, velocities, torques.
+    /// The channels: angles, velocities, torques, further measured columns.
     fn channels(&self) -> impl Iterator<Item = &Cell> {
         let tau = self.tau.iter().flatten().flatten();
-        self.q.iter().chain(self.qd.iter().flatten()).chain(tau)
+        let measured = self.measured.iter().map(|measured| &measured.cell);
+        let of_joints = self.q.iter().chain(self.qd.iter().flatten()).chain(tau);
+        of_joints.chain(measured)
     }
 
     /// Time and all channels.
@@ -297,13 +327,39 @@ impl Header<'_> {
         };
         let qd = columns.qd.as_deref().filter(|_| !still);
         let tau = Some(&columns.tau).filter(|_| !passive);
+        let others = self.others(&columns);
+        let is_single = |name: &String| self.names.iter().filter(|own| *own == name).count() == 1;
+        let is_probe = |name: &String| is_measured(name) && is_single(name);
+        let (probes, ignored) = others.into_iter().partition(is_probe);
         Ok(Layout {
             time: self.find(&columns.time, Quantity::Time, &columns)?,
             q: all(&columns.q, Quantity::Angle)?,
             qd: qd.map(|qd| all(qd, Quantity::Velocity)).transpose()?,
             tau: tau.map(|tau| driven(tau)).transpose()?,
-            ignored: self.others(&columns),
+            measured: self.measured(&columns, probes)?,
+            ignored,
         })
+    }
+
+    /// The measured columns of the model, then these, which it does not mention.
+    fn measured(
+        &self,
+        columns: &Columns,
+        probes: Vec<String>,
+    ) -> Result<Vec<MeasuredCell>, LogError> {
+        let cell = |name: &str, column: &Column, is_needed: bool| {
+            Ok(MeasuredCell {
+                name: name.to_owned(),
+                cell: self.find(column, Quantity::Measured, columns)?,
+                is_needed,
+            })
+        };
+        let needed = columns.measured.iter();
+        let needed = needed.map(|MeasuredColumn { name, column }| cell(name, column, true));
+        let known = |name: &String| columns.measured.iter().any(|own| own.name == *name);
+        let probes = probes.into_iter().filter(|name| !known(name));
+        let probes = probes.map(|name| cell(&name, &Column::named(name.as_str()), false));
+        needed.chain(probes).collect()
     }
 
     /// Numbers for names, unless the columns are numbers as well.
@@ -347,9 +403,9 @@ impl Header<'_> {
             let name = name.to_lowercase();
             words.iter().any(|word| name.contains(word))
         };
-        // `q_level` is the angle of a joint, whatever its name.
-        let is_angle = |name: &String| name.starts_with("q_");
-        let others = self.names.iter().filter(|name| !is_angle(name));
+        // `q_level` is the angle of a joint, whatever its name, and `u_fan_speed` is no joint's velocity.
+        let is_known = |name: &String| name.starts_with("q_") || is_measured(name);
+        let others = self.names.iter().filter(|name| !is_known(name));
         let mut others = others.filter(|name| !is_else(name));
         others.any(is_like)
     }
@@ -431,6 +487,7 @@ impl Header<'_> {
                 format!("{key} = [{example:?}], with \"\" for a joint without a drive")
             }
             Quantity::Angle => format!("q = [{example:?}]"),
+            Quantity::Measured => format!("{wanted} = {example:?}"),
         };
         let known = match nearest {
             Some(name) => format!("did you mean {name:?}?"),
@@ -512,6 +569,7 @@ mod tests {
             q: vec![cell(3)],
             qd: Some(vec![cell(2)]),
             tau: Some(vec![Some(cell(0))]),
+            measured: Vec::new(),
             ignored: vec!["note".to_owned()],
         };
         assert_eq!(found, expected);

@@ -112,8 +112,12 @@ impl Log {
         for q in &mut self.q {
             *q = with_rows(q, missing, |row, share| bent(q, row, share));
         }
-        for qd in &mut self.qd {
-            *qd = with_rows(qd, missing, |row, share| between(qd, row, share));
+        let measured = self
+            .measured
+            .iter_mut()
+            .map(|measured| &mut measured.values);
+        for channel in self.qd.iter_mut().chain(measured) {
+            *channel = with_rows(channel, missing, |row, share| between(channel, row, share));
         }
         for tau in &mut self.tau {
             let is_smooth = |row: usize| smooth.binary_search_by_key(&row, |d| d.row).is_ok();

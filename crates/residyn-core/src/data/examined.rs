@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::local_cubic::half_width_s;
 use super::log::{Interval, Log};
+use super::measured::Measured;
 
 /// Number of rows examined at most, four minutes at 1 kHz: more show the same and cost many times the memory of the
 /// log.
@@ -92,6 +93,12 @@ impl Log {
             tau: self.tau.iter().map(cut).collect(),
             driven_by: self.driven_by,
             torque: self.torque,
+            measured: (self.measured.iter())
+                .map(|measured| Measured {
+                    name: measured.name.clone(),
+                    values: cut(&measured.values),
+                })
+                .collect(),
             masked: self.masked.iter().map(marked).collect(),
             filled: marked(&self.filled),
             leave_out: self.leave_out.clone(),

@@ -14,6 +14,7 @@ use super::error::{CellFault, LogError, Place};
 use super::instant::SAME_S;
 use super::joint::{Joint, of_joints};
 use super::jumps::{bridge, rows_that_jump};
+use super::measured::Measured;
 use super::signal::differences;
 use super::statistics::median_of;
 use super::torque_column::TorqueColumn;
@@ -71,6 +72,9 @@ pub struct Log {
     pub driven_by: Quantity,
     /// What these are: held from row to row, readings at the rows, or means.
     pub torque: TorqueColumn,
+    /// Further measured columns, whose rows are held until the next: those of the model that the log was read for, in
+    /// its order, then others.
+    pub measured: Vec<Measured>,
     /// Rows whose angle jumps, or repeats a reading, and is not to be fitted, `[joint]`, in ascending order. The angle
     /// there is interpolated from the rows around. May be empty: none in a log as it is read.
     pub masked: Vec<Vec<usize>>,
@@ -95,6 +99,7 @@ impl Log {
             tau: vec![Vec::new(); joints],
             driven_by: Quantity::Torque,
             torque: TorqueColumn::Held,
+            measured: Vec::new(),
             masked: vec![Vec::new(); joints],
             filled: Vec::new(),
             leave_out: Vec::new(),
@@ -186,12 +191,12 @@ impl Log {
     }
 
     /// The columns, named and ordered as in a file that is written: `time`, `q1`, ..., `qd1`, ..., `tau1` or `cmd1`,
-    /// ...
+    /// ..., `u_NAME`, ...
     pub fn named_columns(&self) -> impl Iterator<Item = (String, &[f64])> {
         let standard = Columns::standard(self.joints(), self.driven_by);
-        let names: Vec<String> = (standard.in_file_order())
-            .map(|column| column.name.clone())
-            .collect();
+        let names = standard.in_file_order().map(|column| &column.name);
+        let measured = self.measured.iter().map(|measured| &measured.name);
+        let names: Vec<String> = names.chain(measured).cloned().collect();
         names.into_iter().zip(self.columns().map(Vec::as_slice))
     }
 
@@ -201,15 +206,17 @@ impl Log {
             .chain(&self.q)
             .chain(&self.qd)
             .chain(&self.tau)
+            .chain(self.measured.iter().map(|measured| &measured.values))
     }
 
-    /// The columns of a quantity, one for each joint except for the time.
+    /// The columns of a quantity, one for each joint except for the time; measured columns are of no joint.
     pub(super) fn of_mut(&mut self, quantity: Quantity) -> &mut [Vec<f64>] {
         match quantity {
             Quantity::Time => std::slice::from_mut(&mut self.time),
             Quantity::Angle => &mut self.q,
             Quantity::Velocity => &mut self.qd,
             Quantity::Torque | Quantity::Command => &mut self.tau,
+            Quantity::Measured => &mut [],
         }
     }
 
@@ -232,7 +239,7 @@ impl Log {
         Ok(())
     }
 
-    /// The log as CSV with the standard header `time,q1..,qd1..,tau1..`, or `cmd1..`.
+    /// The log as CSV with the standard header `time,q1..,qd1..,tau1..`, or `cmd1..`, and the further measured columns.
     ///
     /// Every number is the shortest text that reads back as the same number. Left-out intervals and notes are not part of
     /// the text.

@@ -6,7 +6,7 @@ use super::column::Quantity;
 /// Words of which one says what a column holds.
 fn words(quantity: Quantity) -> &'static [&'static str] {
     match quantity {
-        Quantity::Time => &[],
+        Quantity::Time | Quantity::Measured => &[],
         Quantity::Angle => &["q", "pos", "position", "angle"],
         Quantity::Velocity => &["qd", "dq", "vel", "velocity", "speed"],
         Quantity::Torque => &["tau", "torque", "effort"],

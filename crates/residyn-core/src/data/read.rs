@@ -4,12 +4,13 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use super::column::{Quantity, unwrap};
-use super::columns::{Cell, Columns, Header, Layout, joints};
+use super::columns::{Cell, Columns, Header, Layout, MeasuredCell, joints};
 use super::error::{CellFault, LogError};
 use super::joint::Joint;
 use super::late;
 use super::local_cubic::slopes;
 use super::log::Log;
+use super::measured::Measured;
 use super::statistics::median;
 use super::table::{Arrays, Numeric, Table};
 use crate::expr::listed;
@@ -58,11 +59,13 @@ impl Log {
         let tau = layout.tau.as_ref();
         let tau = tau.map(|cells| cells.iter().map(&mut driven).collect::<Result<_, _>>());
         let tau = tau.transpose()?;
+        let measured = readings.measured(&layout.measured, &time)?;
         let log = Log {
             is_qd_derived: qd.is_none(),
             qd: qd.unwrap_or_else(|| q.iter().map(|q| slopes(&time, q)).collect()),
             tau: tau.unwrap_or_else(|| vec![vec![0.0; time.len()]; joints]),
             driven_by: columns.driven_by,
+            measured,
             notes: readings.notes,
             q,
             time,
@@ -247,7 +250,32 @@ impl Readings<'_> {
         Ok(time)
     }
 
-    /// The column of an angle, a velocity or a torque, at these times.
+    /// The further measured columns. Those that the model does not need are left out if they are not numbers.
+    fn measured(
+        &mut self,
+        cells: &[MeasuredCell],
+        time: &[f64],
+    ) -> Result<Vec<Measured>, LogError> {
+        let mut measured = Vec::new();
+        for MeasuredCell {
+            name,
+            cell,
+            is_needed,
+        } in cells
+        {
+            match self.channel(cell, time) {
+                Ok(values) => measured.push(Measured {
+                    name: name.clone(),
+                    values,
+                }),
+                Err(fault) if *is_needed => return Err(fault),
+                Err(fault) => (self.notes).push(format!("column {name:?} is ignored: {fault}")),
+            }
+        }
+        Ok(measured)
+    }
+
+    /// The column of an angle, a velocity, a torque or a further measured quantity, at these times.
     fn channel(&mut self, cell: &Cell, time: &[f64]) -> Result<Vec<f64>, LogError> {
         let mut values = self.scaled(cell)?;
         if cell.wrapped {

@@ -4,6 +4,7 @@ use super::direction::{directions, directions_over_steps};
 use super::instant::{ROUNDING, SAME_S};
 use super::log::Log;
 use super::low_pass::LowPass;
+use super::measured::Measured;
 use super::standstill::rests;
 use super::torque_column::TorqueColumn;
 use crate::limits::log_steps;
@@ -28,6 +29,8 @@ pub struct Smooth {
     pub qdd: Vec<Vec<f64>>,
     /// N m or N
     pub tau: Vec<Vec<f64>>,
+    /// The further measured columns of the log.
+    pub measured: Vec<Measured>,
     /// Signs of the velocities, smoothed over a width and filtered like the torques: what remains of friction that
     /// jumps. Empty if no widths are given.
     pub directions: Vec<Vec<f64>>,
@@ -239,6 +242,12 @@ impl Smooth {
             q: each(&|q, k| q[k]),
             tau: (0..log.joints())
                 .map(|joint| smoothing.torques(log, joint))
+                .collect(),
+            measured: (log.measured.iter())
+                .map(|measured| Measured {
+                    name: measured.name.clone(),
+                    values: smoothing.held(&measured.values),
+                })
                 .collect(),
             time: smoothing.used_of(even),
         }

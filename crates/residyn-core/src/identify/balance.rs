@@ -4,7 +4,7 @@ use super::normal_equations::{Reduced, WindowTerms};
 use super::sensitivity::{LANES, Tangent};
 use super::sums::{Sums, loss};
 use super::values::Values;
-use crate::data::{Joint, Log, Smooth, Smoothing, row_from};
+use crate::data::{Joint, Log, Measured, Smooth, Smoothing, row_from};
 use crate::expr::{Program, Tape};
 use crate::lanes::Row;
 use crate::model::Dynamics;
@@ -33,17 +33,17 @@ impl Rows {
     }
 }
 
-/// The torques that act in each log at its rows, `[log][joint][row]`, and their slopes with respect to the model's
-/// filter parameters, `[log][filter][row]`.
+/// What each log gives at its rows, `[log][channel][row]`: the torques that act, then the model's further measured
+/// columns; and the slopes of the torques with respect to the model's filter parameters, `[log][filter][row]`.
 pub(super) struct Acting {
-    tau: Vec<Vec<Vec<f64>>>,
+    given: Vec<Vec<Vec<f64>>>,
     slopes: Vec<Vec<Vec<f64>>>,
 }
 
 impl Acting {
     pub fn of(dynamics: &Dynamics, values: &Values, logs: &[Log], rows: &[Rows]) -> Self {
         let mut acting = Self {
-            tau: Vec::new(),
+            given: Vec::new(),
             slopes: Vec::new(),
         };
         for (index, (log, rows)) in logs.iter().zip(rows).enumerate() {
@@ -63,7 +63,10 @@ impl Acting {
                 }
                 None => tau.clone(),
             });
-            acting.tau.push(tau.collect());
+            let measured = Measured::named(&rows.smooth.measured, dynamics.measured_names());
+            acting
+                .given
+                .push(tau.chain(measured.into_iter().cloned()).collect());
             let slopes = dynamics.filters.iter().map(|filter| {
                 let means = filtered[filter.joint].as_ref();
                 let means = means.expect("the joint has a filter");
@@ -144,7 +147,7 @@ impl Balance {
             tape.inputs()[first_parameter + parameter][lane] = value;
         });
         let of_log = |(log, Rows { smooth, .. }): (usize, &'d Rows)| -> Vec<&'d Vec<f64>> {
-            let driven = smooth.q.iter().chain(&smooth.qd).chain(&acting.tau[log]);
+            let driven = smooth.q.iter().chain(&smooth.qd).chain(&acting.given[log]);
             let timed = driven.chain([&smooth.time]).chain(&smooth.qdd);
             timed
                 .chain(&smooth.directions)

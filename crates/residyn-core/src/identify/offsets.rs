@@ -156,6 +156,7 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
     Dynamics {
         name: dynamics.name.clone(),
         joints: n,
+        measured: dynamics.measured.clone(),
         parameters,
         program: graph.finish(&outputs),
         filters: dynamics.filters.clone(),

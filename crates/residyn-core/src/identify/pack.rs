@@ -131,7 +131,7 @@ impl Pack {
         }
     }
 
-    /// The torque that acted just before `row`.
+    /// The torques that acted just before `row`, and the model's further measured columns.
     fn torque_before(&self, commands: &[Commands<'_>], row: usize) -> Vec<Lane> {
         Commands::just_before(self.logs.map(|log| &commands[log]), self.at[row])
     }

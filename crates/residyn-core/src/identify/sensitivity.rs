@@ -34,6 +34,8 @@ pub(super) struct Tangent {
     /// `q` and `qd`; per joint those with respect to active parameters. Inputs: those of the model.
     pub reading: Option<Program>,
     pub joints: usize,
+    /// The inputs of the model.
+    pub layout: InputLayout,
     /// Index of the first parameter among the inputs.
     pub first_parameter: usize,
     /// Indices into the model's parameters.
@@ -68,6 +70,7 @@ impl Tangent {
             program,
             reading,
             joints: n,
+            layout,
             first_parameter: first + dynamics.filters.len(),
             active: active.to_vec(),
             columns_of,
@@ -232,7 +235,7 @@ pub(super) struct TangentStepper<'t> {
 impl<'t> TangentStepper<'t> {
     pub fn new(tangent: &'t Tangent, values: &[f64], scheme: &'static Scheme) -> Self {
         let n = tangent.joints;
-        let first_read = InputLayout::of(n).parameters();
+        let first_read = tangent.layout.parameters();
         let rows = |count: usize| vec![Row::splat(0.0); count];
         let size = 2 * n * (1 + tangent.columns());
         Self {
@@ -254,14 +257,13 @@ impl<'t> TangentStepper<'t> {
     pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
         self.tape.inputs()[self.tangent.first_parameter + parameter][lane] = value;
         if let Some(reading) = &mut self.reading {
-            reading.inputs()[InputLayout::of(self.tangent.joints).parameters() + parameter][lane] =
-                value;
+            reading.inputs()[self.tangent.layout.parameters() + parameter][lane] = value;
         }
     }
 
-    /// The measured angles (`[n]`) and their sensitivities (`[joint * columns + column]`). `tau` is the torque that acted
-    /// until now.
-    pub fn shown(&mut self, tau: impl FnOnce() -> Vec<Lane>, time: Lane) -> (&[Lane], &[Lane]) {
+    /// The measured angles (`[n]`) and their sensitivities (`[joint * columns + column]`). `given` are the torques that acted
+    /// until now, and the model's further measured columns.
+    pub fn shown(&mut self, given: impl FnOnce() -> Vec<Lane>, time: Lane) -> (&[Lane], &[Lane]) {
         let (n, columns) = (self.tangent.joints, self.tangent.columns());
         let (state, sensitivities) = self.now.split_at(2 * n);
         let (angles, slopes) = self.shown.split_at_mut(n);
@@ -274,10 +276,9 @@ impl<'t> TangentStepper<'t> {
             }
             return (angles, slopes);
         };
-        let inputs = reading.moving();
-        let layout = InputLayout::of(n);
+        let (inputs, layout) = (reading.moving(), self.tangent.layout);
         inputs[layout.states()].copy_from_slice(state);
-        inputs[layout.driving()].copy_from_slice(&tau());
+        inputs[layout.given()].copy_from_slice(&given());
         inputs[layout.time()] = time;
         reading.run();
         let shared = self.tangent.active.len();
@@ -324,8 +325,7 @@ impl<'t> TangentStepper<'t> {
 
     #[inline(always)]
     fn step<S: Simd>(&mut self, simd: S, time: &Lane, h: &Lane) {
-        let n = self.tangent.joints;
-        let layout = InputLayout::of(n);
+        let (n, layout) = (self.tangent.joints, self.tangent.layout);
         let last = self.scheme.stages.len() - 1;
         for (k, stage) in self.scheme.stages.iter().enumerate() {
             let inner = if k == 0 { &self.now } else { &self.inner };
@@ -490,13 +490,12 @@ impl WithSimd for Advance<'_, '_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let n = self.stepper.tangent.joints;
-        let layout = InputLayout::of(n);
+        let layout = self.stepper.tangent.layout;
         let h = Row(self.length.map(|length| length / self.substeps as f64));
         for part in 0..self.substeps {
-            let (tau, slopes) = self.stepper.torque.part(n, part);
+            let (given, slopes) = self.stepper.torque.part(layout.given().len(), part);
             let inputs = self.stepper.tape.moving();
-            inputs[layout.driving()].copy_from_slice(tau);
+            inputs[layout.given()].copy_from_slice(given);
             inputs[layout.parameters()..].copy_from_slice(slopes);
             self.stepper.step(simd, &self.time, &h);
             for lane in 0..LANES {

@@ -4,6 +4,7 @@
 use super::sensitivity::{LANES, Local, Tangent};
 use super::shooting::Shooting;
 use super::values::Values;
+use crate::data::{Log, Measured};
 use crate::lanes::Row;
 use crate::model::Dynamics;
 use crate::sim::{RK4, Window};
@@ -17,27 +18,36 @@ const STABLE_SHARE: f64 = 0.7;
 pub fn longest_stable_step(shooting: &Shooting<'_>, dynamics: &Dynamics) -> f64 {
     let values = Values::of(dynamics, shooting.logs);
     let tangent = Tangent::new(dynamics, &[], Local::State);
-    let of_some = |windows: &[Window]| fastest_decay(shooting, &tangent, &values, windows);
+    let of_some =
+        |windows: &[Window]| fastest_decay(shooting, &tangent, &values, dynamics, windows);
     let fastest = shooting.windows.chunks(LANES).map(of_some);
     STABLE_SHARE * RK4.most_damping / fastest.fold(0.0, f64::max)
 }
 
 /// The largest sum of the rates (1/s) at which the joints' velocities decay at standstill: no eigenvalue of the friction
 /// exceeds it.
-fn fastest_decay(
-    shooting: &Shooting<'_>,
+fn fastest_decay<'l>(
+    shooting: &Shooting<'l>,
     tangent: &Tangent,
     values: &Values,
+    dynamics: &Dynamics,
     windows: &[Window],
 ) -> f64 {
-    let n = tangent.joints;
+    let named = |log: &'l Log| Measured::named(&log.measured, dynamics.measured_names());
+    let given: Vec<Vec<&Vec<f64>>> = shooting.logs.iter().map(named).collect();
+    let (n, layout) = (tangent.joints, dynamics.layout());
     let mut tape = (tangent.program).tape_at::<f64, LANES>(tangent.first_parameter, &values.common);
     let at = |lane: usize| &windows[lane.min(windows.len() - 1)];
     let inputs = tape.moving();
     for joint in 0..n {
         inputs[joint] = Row::from_fn(|lane| shooting.logs[at(lane).log].q[joint][at(lane).first]);
         let tau = |lane: usize| shooting.logs[at(lane).log].held(joint, at(lane).first);
-        inputs[2 * n + joint] = Row::from_fn(tau);
+        inputs[layout.driving().start + joint] = Row::from_fn(tau);
+    }
+    let measured = layout.driving().end..layout.given().end;
+    for (k, input) in inputs[measured].iter_mut().enumerate() {
+        let held = |lane: usize| given[at(lane).log][k][at(lane).first];
+        *input = Row::from_fn(held);
     }
     tape.run();
     let decay = |joint: usize, lane: usize| -tape.output(n + (2 * n + 1) * joint + n)[lane];

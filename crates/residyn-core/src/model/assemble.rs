@@ -4,7 +4,6 @@ use super::dynamics::{Dynamics, Parameter, PerLogValue};
 use super::effect::{Effect, Entry, PLACE, RATIO};
 use super::filter::Filter;
 use super::fitted::FittedEffect;
-use super::input_layout::InputLayout;
 use super::reader::Located;
 use super::system::{Model, Motion};
 use crate::data::{Joint, Quantity};
@@ -36,6 +35,7 @@ impl Model {
         Dynamics {
             name: self.name.clone(),
             joints: self.joints,
+            measured: self.measured_names().map(str::to_owned).collect(),
             parameters: self.all_parameters(),
             program,
             filters: self.filters(),
@@ -100,7 +100,8 @@ impl Model {
         let differences: Vec<Node> = (0..self.joints).map(difference).collect();
         let program = graph.finish(&differences);
         let parameters = self.values().len();
-        Some(self.compiled(with_parameters_last(&program, self.joints, parameters)))
+        let moving = self.layout().parameters();
+        Some(self.compiled(with_parameters_last(&program, moving, parameters)))
     }
 
     /// The mass matrix, row by row, and the bias as a program with the inputs of [`Dynamics`]; `None` for a model that
@@ -177,6 +178,8 @@ struct Assembly<'a> {
     qd: Vec<Node>,
     /// The torque after what has been applied so far; the command before the drive.
     tau: Vec<Node>,
+    /// The further measured columns of the model, in its order.
+    measured: Vec<Node>,
     time: Node,
     declared: Vec<Node>,
     /// The signs of the velocities, if given.
@@ -193,6 +196,8 @@ impl<'a> Assembly<'a> {
         };
         let stems = ["q", "qd", system.driven_by().key()];
         let [q, qd, tau] = stems.map(&mut numbered);
+        let measured = system.measured_names().map(|name| graph.input(name));
+        let measured = measured.collect();
         let time = graph.input("t");
         let declared = system
             .parameters
@@ -216,6 +221,7 @@ impl<'a> Assembly<'a> {
             q,
             qd,
             tau,
+            measured,
             time,
             declared,
             directions: Vec::new(),
@@ -228,6 +234,20 @@ impl<'a> Assembly<'a> {
         joints
             .map(|joint| self.graph.input(&joint.name(stem)))
             .collect()
+    }
+
+    /// A further measured column.
+    fn measured_as(&self, name: &str) -> Option<Node> {
+        let mut names = self.system.measured_names().zip(&self.measured);
+        names.find(|(own, _)| *own == name).map(|(_, node)| *node)
+    }
+
+    /// The names of what the motion does not change: the time and the further measured columns.
+    fn bind_given(&self, scope: &mut Scope) {
+        scope.bind("t", self.time);
+        for (name, node) in self.system.measured_names().zip(&self.measured) {
+            scope.bind(name, *node);
+        }
     }
 
     fn give_directions(&self, scope: &mut Scope) {
@@ -322,7 +342,10 @@ impl<'a> Assembly<'a> {
             .max_by(|a, b| width(a).total_cmp(&width(b)));
         let program = effect.effect.coupling(sign.expect("two of them"));
         let rest = self.graph.constant(0.0);
-        let inputs = [&[q, qd, rest, self.time], nodes.as_slice()].concat();
+        let measured: Vec<Node> = (effect.effect.measured())
+            .filter_map(|name| self.measured_as(name))
+            .collect();
+        let inputs = [&[q, qd, rest, self.time], &*measured, nodes.as_slice()].concat();
         let program = program.expect("the effect is a coupling");
         let out = self.graph.append(&program, &inputs);
         let one = self.graph.constant(1.0);
@@ -353,7 +376,7 @@ impl<'a> Assembly<'a> {
         scope.bind("qd", self.qd[joint]);
         scope.bind("tau", self.tau[joint]);
         scope.bind("load", self.tau[joint]);
-        scope.bind("t", self.time);
+        self.bind_given(&mut scope);
         self.give_directions(&mut scope);
         for (parameter, node) in effect.effect.parameters.iter().zip(nodes) {
             scope.bind(&parameter.name, *node);
@@ -478,7 +501,7 @@ impl<'a> Assembly<'a> {
             scope.bind(&joint.name("qd"), self.qd[joint]);
             scope.bind(&joint.name(driven_by.key()), self.tau[joint]);
         }
-        scope.bind("t", self.time);
+        self.bind_given(&mut scope);
         for (parameter, node) in self.system.parameters.iter().zip(&self.declared) {
             scope.bind(&parameter.name, *node);
         }
@@ -530,11 +553,9 @@ pub(super) fn lower(scope: &Scope, graph: &mut Graph, formula: &Formula) -> Node
         .expect("formulas were checked when the file was read")
 }
 
-/// The same program with its parameters as the last inputs.
-fn with_parameters_last(program: &Program, joints: usize, parameters: usize) -> Program {
-    let (moving, rest) = program
-        .inputs()
-        .split_at(InputLayout::of(joints).parameters());
+/// The same program, whose first inputs are the `moving` ones, with its parameters as the last.
+fn with_parameters_last(program: &Program, moving: usize, parameters: usize) -> Program {
+    let (moving, rest) = program.inputs().split_at(moving);
     let (parameters, more) = rest.split_at(parameters);
     let mut graph = Graph::new();
     let mut inputs =

@@ -7,12 +7,12 @@ use super::Parameter;
 use super::assemble::lower;
 use super::reader::{FileError, Located, Section};
 use super::system::{Equations, Model};
-use crate::data::{Joint, Log, Quantity, Smooth};
+use crate::data::{Joint, Log, Measured, Quantity, Smooth};
 use crate::expr::{Formula, Graph, Node, Program, Scope};
 use crate::lanes::Row;
 
-/// The torque of each joint's drive, as formulas in the commands `cmd1..cmdn`, the measured motion `q1..`, `qd1..`, time `t` and
-/// the parameters of the model.
+/// The torque of each joint's drive, as formulas in the commands `cmd1..cmdn`, the measured motion `q1..`, `qd1..`, the
+/// further measured columns, time `t` and the parameters of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Drive(Vec<Located<Formula>>);
 
@@ -98,30 +98,35 @@ impl Model {
     /// the log's own torques if it holds torques.
     pub fn drive_torques(&self, log: &Log) -> Vec<Vec<f64>> {
         let channels = log.q.iter().chain(&log.qd).chain(&log.tau);
-        let channels: Vec<&[f64]> = channels.chain([&log.time]).map(Vec::as_slice).collect();
-        self.drive_torques_along(log, &channels)
+        self.drive_torques_along(log, channels, &log.measured, &log.time)
     }
 
     /// The log, smoothed, with the same torques in place of its commands.
     pub fn with_drive_torques(&self, log: &Log, smooth: Smooth) -> Smooth {
         let channels = smooth.q.iter().chain(&smooth.qd).chain(&smooth.tau);
-        let channels = channels.chain([&smooth.time]).map(Vec::as_slice);
-        let tau = self.drive_torques_along(log, &channels.collect::<Vec<_>>());
+        let tau = self.drive_torques_along(log, channels, &smooth.measured, &smooth.time);
         Smooth { tau, ..smooth }
     }
 
-    /// The same along positions, velocities, commands and time of a log.
-    fn drive_torques_along(&self, log: &Log, channels: &[&[f64]]) -> Vec<Vec<f64>> {
+    /// The same along positions, velocities, commands, further measured columns and time of a log.
+    fn drive_torques_along<'l>(
+        &self,
+        log: &Log,
+        of_joints: impl Iterator<Item = &'l Vec<f64>>,
+        measured: &'l [Measured],
+        time: &'l Vec<f64>,
+    ) -> Vec<Vec<f64>> {
         let Some(program) = self.drive_program() else {
-            let torques = &channels[2 * self.joints..3 * self.joints];
-            return torques.iter().map(|torques| torques.to_vec()).collect();
+            return of_joints.skip(2 * self.joints).cloned().collect();
         };
-        let rows = channels.last().map_or(0, |time| time.len());
+        let measured = Measured::named(measured, self.measured_names());
+        let channels: Vec<&Vec<f64>> = of_joints.chain(measured).chain([time]).collect();
+        let rows = time.len();
         let mut torques = vec![Vec::with_capacity(rows); self.joints];
         let values = self.declared_values_in(log);
         let mut tape = program.tape_at::<f64, 1>(channels.len(), &values);
         for row in 0..rows {
-            for (slot, channel) in tape.moving().iter_mut().zip(channels) {
+            for (slot, channel) in tape.moving().iter_mut().zip(&channels) {
                 *slot = Row([channel[row]]);
             }
             tape.run();
@@ -144,7 +149,7 @@ impl Model {
         }
     }
 
-    /// The drives' torques as a program of command, state, time and parameters.
+    /// The drives' torques as a program of state, command, further measured columns, time and parameters.
     pub fn drive_program(&self) -> Option<Program> {
         let drive = self.equations.drive.as_ref()?;
         let mut graph = Graph::new();

@@ -69,14 +69,16 @@ impl PerLogValue {
 /// A compiled model: first-order differential equations as one program, with the values of its parameters.
 ///
 /// Inputs of the program, in this order: `q1..qn`, `qd1..qdn` (rad or m, and per second), `tau1..taun`
-/// (N m or N) or the commands of the drives `cmd1..cmdn`, `t` (s), then the parameters in the order of `parameters`. Outputs:
-/// `dq/dt` (n values), then `dqd/dt` (n values). Torques or commands are those that act, after `filters`.
+/// (N m or N) or the commands of the drives `cmd1..cmdn`, the further measured columns in the order of `measured`, `t` (s),
+/// then the parameters in the order of `parameters`. Outputs: `dq/dt` (n values), then `dqd/dt` (n values). Torques or commands are those that act, after `filters`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamics {
     /// Name of the system, for messages and files.
     pub name: String,
     /// Number of joints n.
     pub joints: usize,
+    /// Names of the further measured columns that it reads from logs.
+    pub measured: Vec<String>,
     pub parameters: Vec<Parameter>,
     pub program: Program,
     /// Filters of the commanded torques, see [`Commands`](crate::sim::Commands).
@@ -149,9 +151,14 @@ impl Dynamics {
         }
     }
 
+    /// The names of the further measured columns, in the order in which the program reads them.
+    pub fn measured_names(&self) -> impl Iterator<Item = &str> {
+        self.measured.iter().map(String::as_str)
+    }
+
     /// Places of the program's inputs.
     pub fn layout(&self) -> InputLayout {
-        InputLayout::of(self.joints)
+        InputLayout::of(self.joints).with_measured(self.measured.len())
     }
 
     /// Number of states, 2n.

@@ -1,6 +1,9 @@
+use std::collections::BTreeSet;
+
 use super::assemble::lower;
 use super::error::ModelError;
 use super::filter::CommandFilter;
+use crate::data::{NOMINAL, is_measured};
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm, suggestion};
 
 /// Names that an effect's formula may mention besides its parameters.
@@ -118,6 +121,11 @@ impl Entry {
         }
     }
 
+    /// Whether the formula may mention further measured columns: all but that of a load, which is what it is.
+    pub(super) fn may_be_measured(&self) -> bool {
+        !matches!(self, Self::Payload(_))
+    }
+
     /// Parameters that the effect has by name: the share of the next joint, the position of a load.
     pub(super) fn needed(&self) -> &'static [&'static str] {
         match self {
@@ -198,20 +206,28 @@ impl Effect {
             .map(|parameter| parameter.name.as_str())
     }
 
+    /// The further measured columns that its formula mentions, in the order of their names.
+    pub fn measured(&self) -> impl Iterator<Item = &str> {
+        let names = self.entry.formula().map(Formula::names);
+        let names: BTreeSet<&str> = names.into_iter().flatten().collect();
+        names.into_iter().filter(|name| is_measured(name))
+    }
+
     /// Whether the effect couples its joint with the next one.
     pub fn is_coupling(&self) -> bool {
         matches!(self.entry, Entry::Coupling(_))
     }
 
-    /// The force of a coupling at zero acceleration, and the inertia of the sum, as a program of [`COUPLING_NAMES`] and
-    /// the parameters; `sign` is how dry friction reverses.
+    /// The force of a coupling at zero acceleration, and the inertia of the sum, as a program of [`COUPLING_NAMES`], the
+    /// measured columns and the parameters; `sign` is how dry friction reverses.
     pub(super) fn coupling(&self, sign: SignForm) -> Option<Program> {
         let Entry::Coupling(formula) = &self.entry else {
             return None;
         };
         let mut graph = Graph::new();
         let mut scope = Scope::new(sign);
-        for name in COUPLING_NAMES.into_iter().chain(self.names()) {
+        let motion = COUPLING_NAMES.into_iter().chain(self.measured());
+        for name in motion.chain(self.names()) {
             let node = graph.input(name);
             scope.bind(name, node);
         }
@@ -233,6 +249,9 @@ impl Effect {
             Entry::Torque(formula) => (formula, Some("tau")),
             _ => return None,
         };
+        if self.measured().next().is_some() {
+            return None;
+        }
         let names = formula.names();
         let is_used = |name: &&str| names.contains(name) || replaced == Some(*name);
         let used: Vec<&str> = EFFECT_NAMES.into_iter().filter(is_used).collect();
@@ -308,13 +327,15 @@ impl Effect {
         self.valid_if.as_ref().is_none_or(condition)
     }
 
-    /// The value of a formula, where `of_joint` gives its joint's `q`, `qd`, `tau` and so on.
+    /// The value of a formula, where `of_joint` gives its joint's `q`, `qd`, `tau` and so on; measured columns are at
+    /// [`NOMINAL`].
     fn evaluate(&self, formula: &Formula, values: &[f64], of_joint: impl Fn(&str) -> f64) -> f64 {
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
         let of_joint = EFFECT_NAMES.map(|name| (name, of_joint(name)));
         let own = self.names().zip(values.iter().copied());
-        for (name, value) in of_joint.into_iter().chain(own) {
+        let measured = self.measured().map(|name| (name, NOMINAL));
+        for (name, value) in of_joint.into_iter().chain(measured).chain(own) {
             let node = graph.constant(value);
             scope.bind(name, node);
         }

@@ -8,6 +8,7 @@ use super::reader::{Document, FileError, Located, Section};
 use super::sections;
 use super::tables::{EffectFile, EffectParameterTable, EffectTable};
 use super::values::Named;
+use crate::data::is_measured;
 use crate::expr::Formula;
 
 const ONE_WAY: &str =
@@ -87,8 +88,10 @@ fn entry(table: &mut EffectTable<'_>, parameters: &[EffectParameter]) -> Result<
         return Err(section.error_at(second, format!("an effect has {ONE_WAY}")));
     }
     if let Some(formula) = entry.formula() {
+        let measured = formula.names().into_iter();
+        let measured = measured.filter(|name| is_measured(name) && entry.may_be_measured());
         let known = entry.names().iter().copied().chain(names(parameters));
-        section.check_names(key, formula, known)?;
+        section.check_names(key, formula, known.chain(measured))?;
     } else if !is_one_time(parameters) {
         let message =
             "a filter of the command has one parameter, with `unit = \"s\"` and `positive = true`";

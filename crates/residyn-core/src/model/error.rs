@@ -34,6 +34,22 @@ pub enum ModelError {
     /// The effect is part of the inertia, which the model does not give.
     #[error("`{effect}` needs a model that gives `mass` and `bias`; {model} gives accelerations")]
     NeedsMass { effect: String, model: String },
+    /// The effect depends on a measured column that the model does not declare.
+    #[error(
+        "`{effect}` uses the measured column `{column}`, which the model file does not declare; add the table [measured] \
+         with {column} = \"UNIT\", such as \"V\" or \"K\""
+    )]
+    NotMeasured { effect: String, column: String },
+    /// Something that has no log runs a model that reads a measured column.
+    #[error(
+        "{model} reads the measured column `{column}` of logs, and {what} has no such column; put a parameter with its usual \
+         value in its place, `fixed = true`, and remove it from [measured]"
+    )]
+    ReadsMeasured {
+        model: String,
+        column: String,
+        what: &'static str,
+    },
     /// The model already has this effect, or one that excludes it, on the joint.
     #[error("`{effect}` already acts on joint {joint}")]
     Twice { effect: String, joint: Joint },

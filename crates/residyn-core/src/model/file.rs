@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::columns_in_file::columns;
 use super::drive::Drive;
 use super::effect::Effect;
-use super::input_layout::InputLayout;
+use super::measured_in_file::measured;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Energy, Equations, Model, Motion, Places};
 use super::tables::{ChainTable, EnergyTable, ModelFile};
@@ -37,9 +37,11 @@ impl Model {
             None => Quantity::Torque,
             Some(_) => Quantity::Command,
         };
+        let (measured, measured_at) = measured(document, file.measured)?;
         let parameters = file.parameters.0.iter();
         let places = Places {
             parameters: parameters.map(|(_, table)| table.section.at).collect(),
+            measured: measured_at,
             effects: file.effect.iter().map(|section| section.at).collect(),
         };
         let own = logs_in_file::fitted(&file.parameters)?;
@@ -52,9 +54,16 @@ impl Model {
             columns: Columns {
                 slides: prismatic.clone(),
                 torque: file.log.and_then(|log| log.torque),
-                ..columns(file.columns, joints, driven_by, &system.joint_names)?
+                ..columns(
+                    file.columns,
+                    joints,
+                    driven_by,
+                    &system.joint_names,
+                    &measured,
+                )?
             },
             like,
+            measured,
             joint_names: system.joint_names,
             configurations: logs_in_file::configurations(file.logs, &parameters)?,
             own,
@@ -87,10 +96,10 @@ impl Model {
         Ok(model)
     }
 
-    /// Parameters and intermediates must not take the names of states, torques or each other.
+    /// Parameters and intermediates must not take the names of states, torques, measured columns or each other.
     fn check_names(&self, document: &Document) -> Result<(), FileError> {
         let mut taken: Vec<String> = self.input_names();
-        taken.truncate(InputLayout::of(self.joints).parameters());
+        taken.truncate(self.layout().parameters());
         taken.extend(Joint::all(self.joints).map(|joint| joint.name(Quantity::Command.key())));
         let parameters = self.parameters.iter().map(|parameter| &parameter.name);
         let parameters = parameters.zip(self.places.parameters.iter().copied());
@@ -116,7 +125,7 @@ impl Model {
         let mut names = self.input_names();
         if matches!(self.equations.motion, Motion::Tree(_)) {
             // The inertia of a body does not change as it moves.
-            names.drain(..InputLayout::of(self.joints).parameters());
+            names.drain(..self.layout().parameters());
         }
         let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
         let mut lower = |scope: &Scope, formula: &Located<Formula>| {

@@ -112,6 +112,10 @@ impl FittedEffect {
             let node = graph.input(name);
             scope.bind(&parameter.name, node);
         }
+        for name in self.effect.measured() {
+            let node = graph.input(name);
+            scope.bind(name, node);
+        }
         for stem in self.effect.entry.names() {
             let node = match (*stem, scope.get(RATIO)) {
                 ("t", _) => graph.input("t"),

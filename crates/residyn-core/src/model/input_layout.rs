@@ -2,16 +2,28 @@ use std::ops::Range;
 
 use crate::data::Joint;
 
-/// Places of the inputs of a model's program with this many joints: positions, velocities, torques (or commands) and
-/// the time, then the parameters. A torque balance has accelerations and directions of motion before the parameters.
+/// Places of the inputs of a model's program with this many joints and further measured columns: positions, velocities,
+/// torques (or commands), the measured columns and the time, then the parameters. A torque balance has accelerations and
+/// directions of motion before the parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InputLayout {
     joints: usize,
+    measured: usize,
 }
 
 impl InputLayout {
+    /// That of a model without further measured columns.
     pub const fn of(joints: usize) -> Self {
-        Self { joints }
+        Self {
+            joints,
+            measured: 0,
+        }
+    }
+
+    /// That of a model with this many of them.
+    #[must_use]
+    pub const fn with_measured(self, measured: usize) -> Self {
+        Self { measured, ..self }
     }
 
     pub const fn positions(self) -> Range<usize> {
@@ -32,13 +44,18 @@ impl InputLayout {
         2 * self.joints..3 * self.joints
     }
 
+    /// Torques or commands, then the measured columns: all that a log gives and the motion does not change.
+    pub const fn given(self) -> Range<usize> {
+        2 * self.joints..self.time()
+    }
+
     /// The torque or command of one joint.
     pub fn driving_of(self, joint: Joint) -> usize {
         self.driving().start + joint.index()
     }
 
     pub const fn time(self) -> usize {
-        3 * self.joints
+        3 * self.joints + self.measured
     }
 
     /// The first parameter, after the time.

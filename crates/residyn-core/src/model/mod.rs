@@ -22,6 +22,7 @@ mod like;
 mod like_in_file;
 mod limb;
 mod logs_in_file;
+mod measured_in_file;
 mod network;
 mod reader;
 mod ready_drive;
@@ -47,6 +48,7 @@ pub use filter::{CommandFilter, Filter};
 pub use fitted::{FittedEffect, Status};
 pub use input_layout::InputLayout;
 pub use library::Library;
+pub use measured_in_file::MeasuredQuantity;
 pub use network::to_f32;
 pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,

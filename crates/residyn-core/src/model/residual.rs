@@ -106,6 +106,7 @@ pub fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics {
     Dynamics {
         name: name.to_owned(),
         joints,
+        measured: Vec::new(),
         parameters: Vec::new(),
         program: graph.finish(&rates),
         filters: Vec::new(),

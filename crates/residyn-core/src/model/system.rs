@@ -9,6 +9,8 @@ use super::dynamics::{Dynamics, Parameter, PerLogValue};
 use super::effect::{ActsOn, Effect, Entry, Measure};
 use super::error::ModelError;
 use super::fitted::FittedEffect;
+use super::input_layout::InputLayout;
+use super::measured_in_file::MeasuredQuantity;
 use super::reader::Located;
 use super::tree::{Body, Recovered};
 use crate::data::statistics::mean;
@@ -68,6 +70,8 @@ pub struct Model {
     /// fits then choose it from the speeds in the logs.
     pub smoothing_velocity: Option<Vec<f64>>,
     pub columns: Columns,
+    /// Further measured columns of the logs that formulas may use.
+    pub measured: Vec<MeasuredQuantity>,
     pub parameters: Vec<Parameter>,
     /// Fitted values of declared parameters in single logs; in all other logs those of `parameters` hold.
     pub own: Vec<PerLogValue>,
@@ -84,10 +88,11 @@ pub struct Model {
     pub(super) places: Places,
 }
 
-/// Where the file has its parameters and its effects, in their order \[bytes\].
+/// Where the file has its parameters, its measured columns and its effects, in their order \[bytes\].
 #[derive(Debug, Clone)]
 pub(super) struct Places {
     pub parameters: Vec<usize>,
+    pub measured: Vec<usize>,
     pub effects: Vec<usize>,
 }
 
@@ -115,17 +120,47 @@ impl Model {
         joint.called(self.joint_names.get(joint.index()).map(String::as_str))
     }
 
-    /// The names that formulas of the motion may use before any `let`: states, torques, time, parameters.
+    /// The names of the further measured columns, in the order in which programs read them.
+    pub fn measured_names(&self) -> impl Iterator<Item = &str> {
+        self.measured.iter().map(|quantity| quantity.name.as_str())
+    }
+
+    /// Refuses a model that reads further measured columns, for what runs it without a log: `what`, such as "an exported
+    /// file".
+    ///
+    /// # Errors
+    /// The first column that it reads.
+    pub fn runs_without_logs(&self, what: &'static str) -> Result<(), ModelError> {
+        match self.measured_names().next() {
+            None => Ok(()),
+            Some(column) => Err(ModelError::ReadsMeasured {
+                model: self.name.clone(),
+                column: column.to_owned(),
+                what,
+            }),
+        }
+    }
+
+    /// Places of the inputs of the model's programs.
+    pub(super) fn layout(&self) -> InputLayout {
+        InputLayout::of(self.joints).with_measured(self.measured.len())
+    }
+
+    /// The names that formulas of the motion may use before any `let`: states, torques, further measured columns, time,
+    /// parameters.
     pub fn input_names(&self) -> Vec<String> {
         self.names_under(Quantity::Torque)
     }
 
-    /// States, torques or commands, time and parameters, in the order of a compiled model's inputs.
+    /// States, torques or commands, further measured columns, time and parameters, in the order of a compiled model's
+    /// inputs.
     pub(super) fn names_under(&self, driven_by: Quantity) -> Vec<String> {
         let of_stem = |stem| Joint::all(self.joints).map(move |joint| joint.name(stem));
         let states = ["q", "qd", driven_by.key()].into_iter().flat_map(of_stem);
         let parameters = self.parameters.iter().map(|p| p.name.clone());
-        states.chain(["t".to_owned()]).chain(parameters).collect()
+        let measured = self.measured_names().map(str::to_owned);
+        let moving = states.chain(measured).chain(["t".to_owned()]);
+        moving.chain(parameters).collect()
     }
 
     /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump.
@@ -341,6 +376,13 @@ impl Model {
                 return Err(ModelError::TurningJointsOnly { effect: name() });
             }
             _ => {}
+        }
+        let mut measured = effect.measured();
+        if let Some(column) = measured.find(|name| self.measured_names().all(|own| own != *name)) {
+            return Err(ModelError::NotMeasured {
+                effect: name(),
+                column: column.to_owned(),
+            });
         }
         match effect.entry {
             Entry::Payload(_) if !self.carries_at(joint) => {

@@ -53,6 +53,7 @@ tables! {
         columns: Option<Section<'a>>,
         log: Option<LogTable<'a>>,
         logs: Named<Section<'a>>,
+        measured: Named<Located<String>>,
         drive: Option<Section<'a>>,
         parameters: Named<ParameterTable<'a>>,
         dynamics: Option<Section<'a>>,

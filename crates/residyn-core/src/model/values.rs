@@ -149,6 +149,15 @@ impl Read<'_> for String {
     }
 }
 
+impl Read<'_> for Located<String> {
+    const NAMES: [&'static str; 2] = String::NAMES;
+
+    fn read(entry: Entry<'_, '_>) -> Result<Self, FileError> {
+        let at = entry.at();
+        String::read(entry).map(|value| Self { value, at })
+    }
+}
+
 impl Read<'_> for Located<Formula> {
     const NAMES: [&'static str; 2] = ["a formula in quotes", "formulas"];
 

@@ -48,7 +48,7 @@ impl Plant {
     /// Draw random trajectories.
     ///
     /// # Errors
-    /// Ranges that do not match the plant's joints, or a plant that diverges.
+    /// Ranges that do not match the plant's joints, a plant that diverges, or one whose model reads measured columns.
     pub fn sample(
         &self,
         sampling: &Sampling,
@@ -57,6 +57,7 @@ impl Plant {
         sampling
             .check(self.system.joints)
             .map_err(PlantError::Sampling)?;
+        self.check_measured()?;
         let dynamics = self.dynamics();
         if !dynamics.filters.is_empty() {
             return Err(PlantError::Sampling(

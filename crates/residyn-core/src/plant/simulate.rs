@@ -29,8 +29,9 @@ impl Plant {
     /// Record one log. Velocities are backward differences of the measured angles, as on many rigs.
     ///
     /// # Errors
-    /// A rig that diverges.
+    /// A rig that diverges, or one whose model reads measured columns.
     pub fn record(&self, rng: &mut impl Rng) -> Result<Log, PlantError> {
+        self.check_measured()?;
         let n = self.system.joints;
         let tones = self.excitation.draw(rng);
         let dynamics = self.dynamics();
@@ -61,6 +62,14 @@ impl Plant {
             }
         }
         Ok(log)
+    }
+
+    /// Nothing says what further measured columns would read on a simulated rig.
+    ///
+    /// # Errors
+    /// A model that reads some.
+    pub fn check_measured(&self) -> Result<(), PlantError> {
+        Ok(self.system.runs_without_logs("a simulated rig")?)
     }
 
     /// Why the rig diverged at a time \[s\].

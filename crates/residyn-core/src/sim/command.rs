@@ -3,11 +3,11 @@
 use std::borrow::Cow;
 
 use super::{Hold, Point};
-use crate::data::{Joint, Log, TorqueColumn};
+use crate::data::{Joint, Log, Measured, TorqueColumn};
 use crate::lanes::Row;
 use crate::model::{CommandFilter, Filter};
 
-/// A history of commanded torques, filtered by the delays and lags of a model.
+/// A history of commanded torques, filtered by the delays and lags of a model, and of what else the model reads from a log.
 ///
 /// Each command is held until the next row; the first counts as held for ever before, the last for ever after. The
 /// filters are linear, so the order of a delay and a lag on one joint does not matter.
@@ -16,6 +16,8 @@ pub struct Commands<'l> {
     time: &'l [f64],
     /// The command of each joint, held from each row on.
     tau: Vec<Cow<'l, [f64]>>,
+    /// The further measured columns that the model reads, in its order, held in the same way.
+    measured: Vec<&'l [f64]>,
     joints: usize,
     /// The model's filters, in the order of [`StepTorque::slopes`].
     filters: Vec<Filter>,
@@ -45,12 +47,23 @@ impl Mean {
 
 impl<'l> Commands<'l> {
     /// Filter the torques `tau` (`[joint][row]`), each held from `time[row]` (s) on.
+    ///
+    /// # Panics
+    /// If the model reads further measured columns, which a log alone has: [`Commands::of_log`].
     pub fn new<'p>(model: impl Into<Point<'p>>, time: &'l [f64], tau: &'l [Vec<f64>]) -> Self {
+        let model = model.into();
+        let none = model.dynamics.measured.is_empty();
+        assert!(none, "a model that reads measured columns follows logs");
         let tau = tau.iter().map(|tau| Cow::Borrowed(tau.as_slice()));
-        Self::held_in(model.into(), time, tau.collect())
+        Self::held_in(model, time, tau.collect(), Vec::new())
     }
 
-    fn held_in(model: Point<'_>, time: &'l [f64], tau: Vec<Cow<'l, [f64]>>) -> Self {
+    fn held_in(
+        model: Point<'_>,
+        time: &'l [f64],
+        tau: Vec<Cow<'l, [f64]>>,
+        measured: Vec<&'l [f64]>,
+    ) -> Self {
         let (dynamics, values) = (model.dynamics, model.values());
         let history = |joint: Joint| {
             let own = |kind: CommandFilter| {
@@ -68,13 +81,30 @@ impl<'l> Commands<'l> {
             filters: dynamics.filters.clone(),
             histories: Joint::all(dynamics.joints).map(history).collect(),
             tau,
+            measured,
         }
     }
 
     /// Filter the torques of a log.
+    ///
+    /// # Panics
+    /// If the log lacks a measured column that the model reads: [`Log::check_measured`] tells.
     pub fn of_log<'p>(model: impl Into<Point<'p>>, log: &'l Log) -> Self {
+        let model = model.into();
         let tau = (0..log.joints()).map(|joint| log.held_torques(joint));
-        Self::held_in(model.into(), &log.time, tau.collect())
+        let measured = Measured::named(&log.measured, model.dynamics.measured_names());
+        let measured = measured.into_iter().map(Vec::as_slice);
+        Self::held_in(model, &log.time, tau.collect(), measured.collect())
+    }
+
+    /// What the measured columns read from a time (s) on.
+    fn measured_from(&self, time: f64) -> impl Iterator<Item = f64> {
+        let after = || self.time.partition_point(|row| *row <= time);
+        let row = match self.measured.is_empty() {
+            true => 0,
+            false => after().saturating_sub(1),
+        };
+        self.measured.iter().map(move |column| column[row])
     }
 
     /// The time (s) of one row per lane.
@@ -88,7 +118,8 @@ impl<'l> Commands<'l> {
         Row::table(commands[0].joints, held)
     }
 
-    /// The torque (`[joint][lane]`) that acted just before one row per lane.
+    /// The torque (`[joint][lane]`) that acted just before one row per lane, and after all joints what the measured columns
+    /// read.
     pub fn just_before<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Vec<Row<f64, W>> {
         let of_lane = |joint: usize, lane: usize| {
             let (own, row) = (commands[lane], rows[lane]);
@@ -97,7 +128,17 @@ impl<'l> Commands<'l> {
                 None => own.tau[joint][row.saturating_sub(1)],
             }
         };
-        Row::table(commands[0].joints, of_lane)
+        let read = |column: usize, lane: usize| {
+            commands[lane].measured[column][rows[lane].saturating_sub(1)]
+        };
+        let mut given = Row::table(commands[0].joints, of_lane);
+        given.extend(Row::table(commands[0].measured.len(), read));
+        given
+    }
+
+    /// Number of torques and measured columns.
+    fn channels(&self) -> usize {
+        self.joints + self.measured.len()
     }
 
     /// The log with commanded torques replaced by the mean acting torque from each row to the next.
@@ -134,19 +175,19 @@ impl<'l> Commands<'l> {
     }
 }
 
-/// The torque that acts over a hold, per substep.
+/// What is given over a hold, per substep: the torques that act, and the measured columns.
 #[derive(Debug, Clone, Default)]
 pub struct StepTorque<const W: usize> {
-    /// `[substep * n + joint][lane]`: mean torque in N m (or N). Without filters one entry per joint stands for all
-    /// substeps.
-    pub mean: Vec<Row<f64, W>>,
+    /// `[substep * channels + channel][lane]`: mean torque of each joint in N m (or N), then the measured columns that the
+    /// model reads. Without filters one part stands for all substeps.
+    pub given: Vec<Row<f64, W>>,
     /// `[substep * filters + filter][lane]`: derivative of the mean on the filter's joint with respect to its
     /// parameter.
     pub slopes: Vec<Row<f64, W>>,
 }
 
 impl<const W: usize> StepTorque<W> {
-    /// The torque that acts over a hold.
+    /// What is given over a hold.
     ///
     /// With means over substeps the integration is accurate to second order in the substep wherever the torque jumps,
     /// and its result is smooth in the filters' parameters.
@@ -158,21 +199,37 @@ impl<const W: usize> StepTorque<W> {
 
     /// As [`StepTorque::new`], reusing the memory.
     pub fn fill(&mut self, hold: &Hold<'_, W>) {
-        self.mean.clear();
+        self.given.clear();
         self.slopes.clear();
         let filters = hold.commands[0].filters.len();
         let parts = if filters == 0 { 1 } else { hold.substeps };
-        for _ in 0..parts {
-            self.mean.extend_from_slice(hold.held);
-        }
+        let channels = hold.held.len() + hold.commands[0].measured.len();
         self.slopes.resize(parts * filters, Row::splat(0.0));
+        for part in 0..parts {
+            self.given.extend_from_slice(hold.held);
+            self.given.resize((part + 1) * channels, Row::splat(0.0));
+        }
         for (lane, commands) in hold.commands.iter().enumerate() {
             self.filter(lane, commands, hold);
+            self.read(lane, commands, hold);
         }
-        for (tau, force) in self.mean.iter_mut().zip(hold.force.iter().cycle()) {
-            for lane in 0..W {
-                tau[lane] += force[lane];
+        for given in self.given.chunks_exact_mut(channels) {
+            for (tau, force) in given.iter_mut().zip(hold.force) {
+                for lane in 0..W {
+                    tau[lane] += force[lane];
+                }
             }
+        }
+    }
+
+    /// Write the measured columns of one lane.
+    fn read(&mut self, lane: usize, commands: &Commands<'_>, hold: &Hold<'_, W>) {
+        let channels = commands.channels();
+        for (column, value) in commands.measured_from(hold.from[lane]).enumerate() {
+            let of_all_parts = self.given[commands.joints + column..].iter_mut();
+            of_all_parts
+                .step_by(channels)
+                .for_each(|given| given[lane] = value);
         }
     }
 
@@ -182,7 +239,7 @@ impl<const W: usize> StepTorque<W> {
         for (joint, history) in Joint::all(commands.joints).zip(&commands.histories) {
             let Some(history) = history else { continue };
             for (part, mean) in history.means(from, to, hold.substeps).enumerate() {
-                self.mean[part * commands.joints + joint.index()][lane] = mean.value;
+                self.given[part * commands.channels() + joint.index()][lane] = mean.value;
                 let slopes = self.slopes[part * commands.filters.len()..].iter_mut();
                 for (slope, filter) in slopes.zip(&commands.filters) {
                     if filter.joint == joint {
@@ -193,21 +250,21 @@ impl<const W: usize> StepTorque<W> {
         }
     }
 
-    /// The mean torque per joint over the last substep, or 0 before the first hold.
-    pub(super) fn at_end(&self, joints: usize) -> Vec<Row<f64, W>> {
-        match self.mean.len().checked_sub(joints) {
-            Some(last) => self.mean[last..].to_vec(),
-            None => vec![Row::splat(0.0); joints],
+    /// What was given over the last substep, in this many channels, or 0 before the first hold.
+    pub(super) fn at_end(&self, channels: usize) -> Vec<Row<f64, W>> {
+        match self.given.len().checked_sub(channels) {
+            Some(last) => self.given[last..].to_vec(),
+            None => vec![Row::splat(0.0); channels],
         }
     }
 
-    /// The mean torque per joint over one substep, and its slopes per filter.
-    pub fn part(&self, joints: usize, part: usize) -> (&[Row<f64, W>], &[Row<f64, W>]) {
-        let parts = self.mean.len() / joints;
+    /// What is given over one substep, in this many channels, and the slopes of the torques per filter.
+    pub fn part(&self, channels: usize, part: usize) -> (&[Row<f64, W>], &[Row<f64, W>]) {
+        let parts = self.given.len() / channels;
         let filters = self.slopes.len() / parts;
         let part = part % parts;
         (
-            &self.mean[part * joints..][..joints],
+            &self.given[part * channels..][..channels],
             &self.slopes[part * filters..][..filters],
         )
     }

@@ -11,6 +11,7 @@ use crate::model::InputLayout;
 pub struct Sensors<const W: usize> {
     tape: Option<Tape<f64, W>>,
     joints: usize,
+    layout: InputLayout,
     shown: Vec<Row<f64, W>>,
 }
 
@@ -19,38 +20,39 @@ impl<const W: usize> Sensors<W> {
     pub fn new<'d>(model: impl Into<Point<'d>>) -> Self {
         let model = model.into();
         let joints = model.dynamics.joints;
-        let first = model.dynamics.layout().parameters();
+        let layout = model.dynamics.layout();
         let reading = model.dynamics.reading.as_ref();
         Self {
-            tape: reading.map(|reading| reading.tape_at(first, model.values())),
+            tape: reading.map(|reading| reading.tape_at(layout.parameters(), model.values())),
             joints,
+            layout,
             shown: vec![Row::splat(0.0); joints],
         }
     }
 
     /// Set the value of a parameter in one lane.
     pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
-        let first = InputLayout::of(self.joints).parameters();
+        let first = self.layout.parameters();
         if let Some(tape) = &mut self.tape {
             tape.inputs()[first + parameter][lane] = value;
         }
     }
 
-    /// The angles (`[n][lane]`) measured in `state` (`[2n][lane]`) at `time` (s). `tau` (`[n][lane]`) is the torque that
-    /// acted until then.
+    /// The angles (`[n][lane]`) measured in `state` (`[2n][lane]`) at `time` (s). `given` (`[channel][lane]`) are the torques
+    /// that acted until then, and the model's further measured columns.
     pub fn show<'s>(
         &'s mut self,
         state: &'s [Row<f64, W>],
-        tau: impl FnOnce() -> Vec<Row<f64, W>>,
+        given: impl FnOnce() -> Vec<Row<f64, W>>,
         time: Row<f64, W>,
     ) -> &'s [Row<f64, W>] {
         let n = self.joints;
         let Some(tape) = &mut self.tape else {
             return &state[..n];
         };
-        let (inputs, layout) = (tape.moving(), InputLayout::of(n));
+        let (inputs, layout) = (tape.moving(), self.layout);
         inputs[layout.states()].copy_from_slice(state);
-        inputs[layout.driving()].copy_from_slice(&tau());
+        inputs[layout.given()].copy_from_slice(&given());
         inputs[layout.time()] = time;
         tape.run();
         for (k, shown) in self.shown.iter_mut().enumerate() {
@@ -64,11 +66,11 @@ impl<const W: usize> Sensors<W> {
     pub fn correct(
         &mut self,
         state: &mut [Row<f64, W>],
-        tau: impl FnOnce() -> Vec<Row<f64, W>>,
+        given: impl FnOnce() -> Vec<Row<f64, W>>,
         time: Row<f64, W>,
     ) {
         let seen = state.to_vec();
-        let shown = self.show(&seen, tau, time);
+        let shown = self.show(&seen, given, time);
         for ((angle, shown), seen) in state.iter_mut().zip(shown).zip(&seen) {
             for lane in 0..W {
                 angle[lane] -= shown[lane] - seen[lane];

@@ -9,6 +9,8 @@ pub struct Simulator<const W: usize> {
     stepper: Stepper<W>,
     sensors: Sensors<W>,
     torque: StepTorque<W>,
+    /// Number of torques and further measured columns.
+    channels: usize,
 }
 
 /// An interval over which commanded torques are held, one interval per lane.
@@ -73,6 +75,7 @@ impl<const W: usize> Simulator<W> {
         let model = model.into();
         Self {
             state: vec![Row::splat(0.0); model.dynamics.states()],
+            channels: model.dynamics.layout().given().len(),
             sensors: Sensors::new(model.clone()),
             stepper: Stepper::new(model, scheme),
             torque: StepTorque::default(),
@@ -88,9 +91,9 @@ impl<const W: usize> Simulator<W> {
     /// Move the states to the end of a hold.
     pub fn advance(&mut self, hold: &Hold<'_, W>) {
         self.torque.fill(hold);
-        let (state, torque) = (&mut self.state, &self.torque.mean);
+        let (state, given) = (&mut self.state, &self.torque.given);
         self.stepper
-            .advance(state, torque, hold.from, hold.length, hold.substeps);
+            .advance(state, given, hold.from, hold.length, hold.substeps);
     }
 
     /// Move the states from a row of each lane's command history to the next, in substeps of at most `longest_s`.
@@ -112,14 +115,15 @@ impl<const W: usize> Simulator<W> {
 
     /// The angles that sensors show at `time` (s), after the last hold.
     pub fn angles_at(&mut self, time: Row<f64, W>) -> &[Row<f64, W>] {
-        let n = self.state.len() / 2;
-        self.sensors
-            .show(&self.state, || self.torque.at_end(n), time)
+        let before = || self.torque.at_end(self.channels);
+        self.sensors.show(&self.state, before, time)
     }
 
     /// The torque (`[n][lane]`) that acted over the last part of the last hold; 0 before the first.
     pub fn acting(&self) -> Vec<Row<f64, W>> {
-        self.torque.at_end(self.state.len() / 2)
+        let mut given = self.torque.at_end(self.channels);
+        given.truncate(self.state.len() / 2);
+        given
     }
 }
 

@@ -8,6 +8,7 @@ pub struct Stepper<const W: usize> {
     scheme: &'static Scheme,
     tape: Tape<f64, W>,
     joints: usize,
+    layout: InputLayout,
     slope: Vec<Row<f64, W>>,
     sum: Vec<Row<f64, W>>,
 }
@@ -18,11 +19,12 @@ impl<const W: usize> Stepper<W> {
         let model = model.into();
         let dynamics = model.dynamics;
         let states = vec![Row::splat(0.0); dynamics.states()];
-        let first = dynamics.layout().parameters();
+        let layout = dynamics.layout();
         Self {
             scheme,
-            tape: dynamics.program.tape_at(first, model.values()),
+            tape: (dynamics.program).tape_at(layout.parameters(), model.values()),
             joints: dynamics.joints,
+            layout,
             slope: states.clone(),
             sum: states,
         }
@@ -30,17 +32,17 @@ impl<const W: usize> Stepper<W> {
 
     /// Set the value of a parameter in one lane.
     pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
-        let first = InputLayout::of(self.joints).parameters();
+        let first = self.layout.parameters();
         self.tape.inputs()[first + parameter][lane] = value;
     }
 
     /// Advance `state` (`[2n][lane]`: positions, then velocities) from `time` by `length` seconds in `substeps` equal
-    /// substeps. `tau` (`[n][lane]`) acts over all of them or, if it differs between them,
-    /// `[substep * n + joint][lane]`.
+    /// substeps. What is `given`, torques and then the model's further measured columns (`[channel][lane]`), holds over all
+    /// of them or, if it differs between them, `[substep * channels + channel][lane]`.
     pub fn advance(
         &mut self,
         state: &mut [Row<f64, W>],
-        tau: &[Row<f64, W>],
+        given: &[Row<f64, W>],
         time: Row<f64, W>,
         length: Row<f64, W>,
         substeps: usize,
@@ -48,7 +50,7 @@ impl<const W: usize> Stepper<W> {
         Row::<f64, W>::dispatch(Advance {
             stepper: self,
             state,
-            tau,
+            given,
             time,
             length,
             substeps,
@@ -63,7 +65,7 @@ impl<const W: usize> Stepper<W> {
         time: &mut Row<f64, W>,
         h: &Row<f64, W>,
     ) {
-        let layout = InputLayout::of(self.joints);
+        let layout = self.layout;
         self.tape.moving()[layout.states()].copy_from_slice(state);
         self.sum.copy_from_slice(state);
         self.tape.moving()[layout.time()] = *time;
@@ -118,7 +120,7 @@ impl<const W: usize> Stepper<W> {
 struct Advance<'a, const W: usize> {
     stepper: &'a mut Stepper<W>,
     state: &'a mut [Row<f64, W>],
-    tau: &'a [Row<f64, W>],
+    given: &'a [Row<f64, W>],
     time: Row<f64, W>,
     length: Row<f64, W>,
     substeps: usize,
@@ -129,12 +131,12 @@ impl<const W: usize> WithSimd for Advance<'_, W> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let n = self.stepper.joints;
-        let layout = InputLayout::of(n);
+        let places = self.stepper.layout.given();
         #[allow(clippy::cast_precision_loss)] // few substeps
         let h = Row(self.length.map(|length| length / self.substeps as f64));
-        for tau in self.tau.chunks(n).cycle().take(self.substeps) {
-            self.stepper.tape.moving()[layout.driving()].copy_from_slice(tau);
+        let parts = self.given.chunks(places.len()).cycle();
+        for given in parts.take(self.substeps) {
+            self.stepper.tape.moving()[places.clone()].copy_from_slice(given);
             self.stepper.step(simd, self.state, &mut self.time, &h);
         }
     }

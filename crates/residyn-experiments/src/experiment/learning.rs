@@ -5,7 +5,7 @@ use serde_json::json;
 use super::{Config, ExperimentError, MethodConfig};
 use crate::mbrl::{Folder, Learner, Prior, Round, Run, RunError};
 use residyn_control::control::Predictor;
-use residyn_core::model::{Dynamics, Library, Model, Origin};
+use residyn_core::model::{Dynamics, Library, Model, ModelError, Origin};
 use residyn_core::sim::Integrator;
 use residyn_io::files::{beside, beside_or_named, content_id};
 use residyn_io::read_model;
@@ -58,6 +58,8 @@ impl Method {
         let mut dynamics = plant.dynamics();
         let prior = if let Some(file) = &method.model {
             let model = read_model(beside_or_named(&config.path, file), library)?;
+            let refused = |error: ModelError| config.wrong(error.to_string());
+            model.runs_without_logs("an experiment").map_err(refused)?;
             dynamics = model.dynamics();
             model_toml.clone_from(&model.declaration);
             inputs.push((file.clone(), content_id(model_toml.as_bytes())));

@@ -63,6 +63,7 @@ impl SavedModel {
         let equations = Dynamics {
             name: system,
             joints,
+            measured: Vec::new(),
             filters: self.equations.filters(&names)?,
             program: self.equations.program()?,
             parameters: values.map(|(p, value)| p.restore(*value)).collect(),

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use crate::{CheckpointError, HybridError, SegmentsError, TrainError};
 use residyn_core::data::LogError;
-use residyn_core::model::FileError;
+use residyn_core::model::{FileError, ModelError};
 use residyn_core::plant::PlantError;
 use residyn_io::runs::RunFolderError;
 
@@ -35,6 +35,8 @@ pub enum RecipeError {
     Folder(#[from] RunFolderError),
     #[error(transparent)]
     Model(#[from] FileError),
+    #[error(transparent)]
+    Measured(#[from] ModelError),
     #[error(transparent)]
     Log(#[from] LogError),
     #[error(transparent)]

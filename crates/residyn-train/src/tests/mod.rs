@@ -55,6 +55,7 @@ pub(super) fn one_joint(formula: &str, parameters: Vec<Parameter>) -> Dynamics {
     Dynamics {
         name: "pendulum".to_owned(),
         joints: 1,
+        measured: Vec::new(),
         parameters,
         program: graph.finish(&[velocity, acceleration]),
         filters: Vec::new(),

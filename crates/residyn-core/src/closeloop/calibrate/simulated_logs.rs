@@ -87,6 +87,7 @@ fn apart(problem: &Problem<'_>) -> Vec<Log> {
             path: log.path.clone(),
             driven_by: log.driven_by,
             notes: log.notes.clone(),
+            measured: log.empty_measured(),
             ..Log::empty(log.joints())
         };
         for window in windows.iter().filter(|window| window.log == index) {
@@ -101,6 +102,9 @@ fn apart(problem: &Problem<'_>) -> Vec<Log> {
                     out.q[j].push(log.q[j][row]);
                     out.qd[j].push(log.qd[j][row]);
                     out.tau[j].push(log.held(j, row));
+                }
+                for (own, value) in out.measured.iter_mut().zip(log.measured_at(row)) {
+                    own.values.push(value);
                 }
             }
         }

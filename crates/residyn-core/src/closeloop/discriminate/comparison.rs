@@ -204,7 +204,8 @@ fn window_of(problem: &Problem<'_>, fitted: &Fitted, w: usize) -> Motion {
         log: window.log,
         start: fitted.fit.start_states[w].clone(),
         time: log.time[rows.clone()].to_vec(),
-        tau: rows.map(row).collect(),
+        tau: rows.clone().map(row).collect(),
+        measured: rows.map(|row| log.measured_at(row)).collect(),
     }
 }
 

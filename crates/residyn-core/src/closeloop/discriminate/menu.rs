@@ -242,6 +242,7 @@ impl MenuItem {
             start: self.state(problem, state, joint),
             time: Vec::new(),
             tau: Vec::new(),
+            measured: Vec::new(),
         };
         for row in 0..=rows {
             let since = row as f64 * step_s;
@@ -256,6 +257,7 @@ impl MenuItem {
             let held = row_after(&log.time, at).max(1) - 1;
             let logged = log.tau.iter().map(|tau| tau[held]);
             motion.time.push(begin + since);
+            motion.measured.push(log.measured_at(held));
             motion.tau.push(match self.drive {
                 Drive::Logged { factor, .. } => logged.map(|tau| factor * tau).collect(),
                 Drive::Added(share) => with(logged, joint, share * top),

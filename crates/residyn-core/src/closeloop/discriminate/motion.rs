@@ -17,6 +17,8 @@ pub(super) struct Motion {
     pub time: Vec<f64>,
     /// Torques, `[row][joint]`, each held until the next row.
     pub tau: Vec<Vec<f64>>,
+    /// What the further measured columns of its log read, `[row][column]`, each held until the next row.
+    pub measured: Vec<Vec<f64>>,
 }
 
 /// Simulated logs, each a sequence of motions.
@@ -66,6 +68,7 @@ impl Record {
         self.logs.push(Log {
             path: log.path.clone(),
             driven_by: log.driven_by,
+            measured: log.empty_measured(),
             ..Log::empty(log.joints())
         });
         self.logs.len() - 1
@@ -105,17 +108,20 @@ impl Record {
     }
 }
 
-/// Append the torques of a motion to a log, after a pause, and return the row at which it begins.
+/// Append the torques and measured columns of a motion to a log, after a pause, and return the row at which it begins.
 fn append(log: &mut Log, motion: &Motion, pause_s: f64) -> usize {
     let after_pause = |last: &f64| last + 2.0 * pause_s;
     let earliest = log.time.last().map_or(f64::NEG_INFINITY, after_pause);
     let delay = (earliest - motion.time[0]).max(0.0);
-    let pause = (motion.time[0] - pause_s, &motion.tau[0]);
-    let rows = motion.time.iter().copied().zip(&motion.tau);
-    for (time, tau) in std::iter::once(pause).chain(rows) {
+    let pause = (motion.time[0] - pause_s, 0);
+    let rows = motion.time.iter().copied().zip(0..);
+    for (time, row) in std::iter::once(pause).chain(rows) {
         log.time.push(time + delay);
-        for (column, tau) in log.tau.iter_mut().zip(tau) {
+        for (column, tau) in log.tau.iter_mut().zip(&motion.tau[row]) {
             column.push(*tau);
+        }
+        for (column, value) in log.measured.iter_mut().zip(&motion.measured[row]) {
+            column.values.push(*value);
         }
     }
     log.time.len() - motion.time.len()

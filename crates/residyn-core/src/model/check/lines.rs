@@ -15,6 +15,12 @@ impl Model {
         Some(self.line(*self.places.parameters.get(k)?))
     }
 
+    /// The line of a measured column's unit.
+    pub(super) fn line_of_measured(&self, name: &str) -> Option<usize> {
+        let k = self.measured_names().position(|own| own == name)?;
+        Some(self.line(*self.places.measured.get(k)?))
+    }
+
     /// The line of an intermediate.
     pub(super) fn line_of_let(&self, name: &str) -> Option<usize> {
         let mut lets = self.equations.lets.iter();

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use rand::{Rng, RngExt};
 
 use super::{Finding, Kind};
-use crate::data::Joint;
+use crate::data::{Joint, NOMINAL};
 use crate::decomposition::eigen;
 use crate::model::system::{Model, Motion};
 
@@ -46,11 +46,17 @@ fn samples(model: &Model, rng: &mut impl Rng) -> Vec<Sample> {
     let mut states = vec![vec![0.0; 2 * n]];
     states.extend(drawn(n, rng));
     let sample = |state: Vec<f64>| {
-        let inputs = [&state, vec![0.0; n + 1].as_slice(), &model.values()].concat();
+        let inputs = [&state, &*at_rest(model), &model.values()].concat();
         let matrix = DMatrix::from_row_slice(n, n, &program.eval(&inputs)[..n * n]);
         Sample { state, matrix }
     };
     states.into_iter().map(sample).collect()
+}
+
+/// No torque, measured columns at [`NOMINAL`], and the beginning of time: what a program reads after the state.
+pub(super) fn at_rest(model: &Model) -> Vec<f64> {
+    let measured = vec![NOMINAL; model.measured.len()];
+    [vec![0.0; model.joints], measured, vec![0.0]].concat()
 }
 
 /// Random states of this many joints, anywhere.

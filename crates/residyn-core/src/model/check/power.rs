@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 
-use super::mass::{at, drawn};
+use super::mass::{at, at_rest, drawn};
 use super::{Finding, Kind};
 use crate::model::system::{Model, Motion};
 
@@ -61,7 +61,7 @@ fn powers(model: &Model, rng: &mut impl Rng) -> Vec<Powers> {
     let n = model.joints;
     let values = model.values();
     let mass_and_bias = |q: &[f64], qd: &[f64]| {
-        let mut mass = program.eval(&[q, qd, &vec![0.0; n + 1], &values].concat());
+        let mut mass = program.eval(&[q, qd, &at_rest(model), &values].concat());
         let bias = mass.split_off(n * n);
         (DMatrix::from_row_slice(n, n, &mass), DVector::from(bias))
     };

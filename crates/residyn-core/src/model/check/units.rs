@@ -12,6 +12,7 @@ use crate::expr::{Formula, Unit};
 use crate::model::effect::{Effect, Entry};
 use crate::model::reader::Located;
 use crate::model::system::{Model, Motion};
+use crate::model::{MeasuredQuantity, Parameter};
 
 /// Names and their units, if they have one.
 type Names = HashMap<String, Option<Unit>>;
@@ -23,6 +24,7 @@ pub(super) fn find(model: &Model) -> Vec<Finding> {
         findings: Vec::new(),
     };
     units.parameters();
+    units.measured();
     units.states();
     units.drive();
     units.intermediates();
@@ -61,18 +63,29 @@ struct Units<'p> {
 impl Units<'_> {
     fn parameters(&mut self) {
         let model = self.model;
-        for parameter in &model.parameters {
-            let known = declared(&parameter.unit);
-            if known.is_none() && !parameter.unit.is_empty() {
-                let text = format!(
-                    "the unit `{}` of `{}` is not a product of SI units: values are in SI units, and terms that \
-                     contain it are not checked",
-                    parameter.unit, parameter.name
-                );
-                self.tell(self.model.line_of_parameter(&parameter.name), text);
-            }
-            self.names.insert(parameter.name.clone(), known);
+        for Parameter { name, unit, .. } in &model.parameters {
+            self.quantity(model.line_of_parameter(name), name, unit);
         }
+    }
+
+    fn measured(&mut self) {
+        let model = self.model;
+        for MeasuredQuantity { name, unit } in &model.measured {
+            self.quantity(model.line_of_measured(name), name, unit);
+        }
+    }
+
+    /// A name with the unit that the file declares for it.
+    fn quantity(&mut self, line: Option<usize>, name: &str, unit: &str) {
+        let known = declared(unit);
+        if known.is_none() && !unit.is_empty() {
+            let text = format!(
+                "the unit `{unit}` of `{name}` is not a product of SI units: values are in SI units, and terms that \
+                 contain it are not checked"
+            );
+            self.tell(line, text);
+        }
+        self.names.insert(name.to_owned(), known);
     }
 
     fn states(&mut self) {
@@ -175,7 +188,10 @@ impl Units<'_> {
         let motion = motion.map(|(name, text)| (name.to_owned(), Some(unit(text))));
         let parameters = effect.parameters.iter();
         let parameters = parameters.map(|p| (p.name.clone(), declared(&p.unit)));
-        let names: Names = motion.into_iter().chain(parameters).collect();
+        let measured = self.model.measured.iter();
+        let measured = measured.map(|own| (own.name.clone(), declared(&own.unit)));
+        let motion = motion.into_iter().chain(measured);
+        let names: Names = motion.chain(parameters).collect();
         let (formula, of_kind) = match &effect.entry {
             Entry::Force(formula) | Entry::Torque(formula) | Entry::Coupling(formula) => {
                 (formula, "N m")

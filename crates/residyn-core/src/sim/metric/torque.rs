@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::data::{Joint, Log, Smooth, Smoothing, TorqueColumn};
+use crate::data::{Joint, Log, Measured, Smooth, Smoothing, TorqueColumn};
 use crate::lanes::Row;
 use crate::model::{Dynamics, Model};
 use crate::sim::Commands;
@@ -199,11 +199,13 @@ pub(crate) fn balance_of(balance: &Dynamics, acting: &Smooth) -> Vec<Vec<f64>> {
     let values = balance.values();
     let first = balance.program.inputs().len() - values.len();
     let mut tape = balance.program.tape_at::<f64, LANES>(first, &values);
+    let measured = Measured::named(&acting.measured, balance.measured_names());
     let mut found = vec![vec![0.0; acting.rows()]; balance.joints];
     for first in (0..acting.rows()).step_by(LANES) {
         let rows: [usize; LANES] = std::array::from_fn(|k| (first + k).min(acting.rows() - 1));
         let of_rows = |channel: &[f64]| Row(rows.map(|row| channel[row]));
         let channels = (acting.q.iter().chain(&acting.qd).chain(&acting.tau))
+            .chain(measured.iter().copied())
             .chain([&acting.time])
             .chain(&acting.qdd);
         for (slot, channel) in tape.moving().iter_mut().zip(channels) {
@@ -270,6 +272,7 @@ mod tests {
             qd: channel(1),
             qdd: channel(2),
             tau: vec![vec![0.0; time.len()]; 2],
+            measured: Vec::new(),
             directions: Vec::new(),
             rests: Vec::new(),
             time: time.clone(),

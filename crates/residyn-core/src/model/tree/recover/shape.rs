@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::data::NOMINAL;
 use crate::decomposition::least_squares;
 use crate::model::Dynamics;
 use crate::model::tree::equations::christoffel;
@@ -212,8 +213,9 @@ fn states(n: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
 fn equations(declared: &Dynamics, q: &[f64], qd: &[f64]) -> Option<DVector<f64>> {
     let n = declared.joints;
     let values = declared.values();
+    let measured = vec![NOMINAL; declared.measured.len()];
     let accelerations = |tau: &DVector<f64>| {
-        let inputs = [q, qd, tau.as_slice(), &[0.0], &values].concat();
+        let inputs = [q, qd, tau.as_slice(), &measured, &[0.0], &values].concat();
         DVector::from_column_slice(&declared.program.eval(&inputs)[n..])
     };
     let free = accelerations(&DVector::zeros(n));
