@@ -239,13 +239,34 @@ fn another_name_and_unit_are_mapped_under_columns() {
     assert_eq!(log.measured[0].values, [12.0, 12.5, 13.0]);
 }
 
+#[test]
+fn names_that_nothing_declares_are_columns_without_a_unit() {
+    let scratch = scratch();
+    scratch.file(
+        "short.toml",
+        MOTOR.replace("[measured]\nu_volts = \"V\"\n", ""),
+    );
+    scratch.file("run.csv", motor_log(STANDARD, 1.0));
+    scratch.succeeds("check short.toml");
+    let evaluated = |model: &str| {
+        scratch.json(&format!(
+            "evaluate --model {model} --test run.csv --horizon 0.5"
+        ))["position_rmse"]
+            .clone()
+    };
+    assert_eq!(evaluated("short.toml"), evaluated("motor.toml"));
+    let warm = "[[effect]]\nname = \"warm_friction\"\njoint = 1\nb = 1\nc = 1\n[drive]";
+    scratch.file("warm.toml", MOTOR.replace("[drive]", warm));
+    let said = scratch.refuses("evaluate --model warm.toml --test run.csv --effects effects");
+    says(&said, &["there is no column \"u_temp\""]);
+}
+
 /// What replaces `[drive]` in the motor's file, and words of the message.
 const MISTAKES: &str = r#"
 [columns]\nu_volts = { column = "t", unit = "K" }\n[drive] | a column in K does not hold `u_volts`, which is in `V` under [measured]
 [columns]\nu_amps = "amps"\n[drive]                        | unknown key `u_amps` in [columns]
 volts = "V"\n[drive]                                       | `volts` cannot be a measured column: its name begins with u_
 [parameters.u_volts]\nvalue = 1\n[drive]                   | u_volts
-[[effect]]\nname = "warm_friction"\njoint = 1\nb = 1\nc = 1\n[drive] | `warm_friction` uses the measured column `u_temp`, which the model file does not declare; add the table [measured]
 "#;
 
 #[test]

@@ -37,15 +37,41 @@ impl Model {
             None => Quantity::Torque,
             Some(_) => Quantity::Command,
         };
-        let (measured, measured_at) = measured(document, file.measured)?;
-        let parameters = file.parameters.0.iter();
-        let places = Places {
-            parameters: parameters.map(|(_, table)| table.section.at).collect(),
-            measured: measured_at,
+        let equations = Equations {
+            lets: sections::lets(&top)?,
+            motion: motion(&top, file.chain, &prismatic)?,
+            energy: file
+                .energy
+                .map(|EnergyTable { total, power, .. }| Energy { total, power }),
+            drive: file
+                .drive
+                .map(|section| Drive::read(&section, joints))
+                .transpose()?,
+        };
+        let effects = effects_in_file::read(&file.effect, joints, library)?;
+        let mut places = Places {
+            parameters: (file.parameters.0.iter())
+                .map(|(_, table)| table.section.at)
+                .collect(),
+            measured: Vec::new(),
             effects: file.effect.iter().map(|section| section.at).collect(),
         };
         let own = logs_in_file::fitted(&file.parameters)?;
         let parameters = sections::parameters(file.parameters)?;
+        let of_formulas = equations.formulas().flat_map(Located::names);
+        let of_effects = effects.iter().zip(&places.effects);
+        let of_effects =
+            of_effects.flat_map(|(own, at)| own.effect.measured().map(move |name| (name, *at)));
+        let lets = equations.lets.iter().map(|(name, _)| name.as_str());
+        let declared = parameters.iter().map(|own| own.name.as_str()).chain(lets);
+        let measured = measured(
+            document,
+            file.measured,
+            of_formulas.chain(of_effects),
+            &declared.collect::<Vec<_>>(),
+        )?;
+        let (measured, measured_at): (Vec<_>, Vec<usize>) = measured.into_iter().unzip();
+        places.measured = measured_at;
         let model = Self {
             joints,
             smoothing_velocity: system.smoothing_velocity,
@@ -68,22 +94,12 @@ impl Model {
             configurations: logs_in_file::configurations(file.logs, &parameters)?,
             own,
             parameters,
-            effects: effects_in_file::read(&file.effect, joints, library)?,
+            effects,
             hidden: sections::hidden(file.residual, joints)?,
             text: document.text.clone(),
             places,
             declaration: sections::declaration(document)?,
-            equations: Arc::new(Equations {
-                lets: sections::lets(&top)?,
-                motion: motion(&top, file.chain, &prismatic)?,
-                energy: file
-                    .energy
-                    .map(|EnergyTable { total, power, .. }| Energy { total, power }),
-                drive: file
-                    .drive
-                    .map(|section| Drive::read(&section, joints))
-                    .transpose()?,
-            }),
+            equations: Arc::new(equations),
             prismatic,
         };
         model.check_names(document)?;

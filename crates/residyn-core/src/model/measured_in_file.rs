@@ -10,15 +10,18 @@ use crate::expr::parse;
 pub struct MeasuredQuantity {
     /// In formulas, and in the header of a log: `u_volts`.
     pub name: String,
-    /// SI, as text; empty for a pure number.
+    /// SI, as text; empty if the file gives none.
     pub unit: String,
 }
 
-/// The quantities, in the order of the file, and where their units stand in it \[bytes\].
-pub(super) fn measured(
+/// The quantities, each with the place of its unit in the file \[bytes\]: those of the table, in its order, then those that
+/// formulas mention, by name and place, and that nothing else of the file is called. The units of these are unknown.
+pub(super) fn measured<'n>(
     document: &Document,
     Named(table): Named<Located<String>>,
-) -> Result<(Vec<MeasuredQuantity>, Vec<usize>), FileError> {
+    mentioned: impl Iterator<Item = (&'n str, usize)>,
+    others: &[&str],
+) -> Result<Vec<(MeasuredQuantity, usize)>, FileError> {
     let quantity = |(name, unit): (String, Located<String>)| {
         let is_usable = parse(&name).is_ok_and(|formula| formula.is_name(&name));
         if is_measured(&name) && is_usable {
@@ -31,6 +34,16 @@ pub(super) fn measured(
         );
         Err(document.error(unit.at, message))
     };
-    let quantities: Result<Vec<_>, _> = table.into_iter().map(quantity).collect();
-    quantities.map(|quantities| quantities.into_iter().unzip())
+    let mut all: Vec<_> = table.into_iter().map(quantity).collect::<Result<_, _>>()?;
+    for (name, at) in mentioned {
+        let is_known = others.contains(&name) || all.iter().any(|(own, _)| own.name == name);
+        if is_measured(name) && !is_known {
+            let quantity = MeasuredQuantity {
+                name: name.to_owned(),
+                unit: String::new(),
+            };
+            all.push((quantity, at));
+        }
+    }
+    Ok(all)
 }

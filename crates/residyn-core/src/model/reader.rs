@@ -86,6 +86,13 @@ pub(super) struct Located<T> {
     pub at: usize,
 }
 
+impl Located<Formula> {
+    /// The names that it mentions, each with the formula's place.
+    pub fn names(&self) -> impl Iterator<Item = (&str, usize)> {
+        self.value.names().into_iter().map(|name| (name, self.at))
+    }
+}
+
 impl Document {
     pub fn new(path: &Path, text: &str) -> Self {
         Self {

@@ -536,6 +536,19 @@ impl Model {
     }
 }
 
+impl Equations {
+    /// All formulas of the file but those of effects.
+    pub fn formulas(&self) -> impl Iterator<Item = &Located<Formula>> {
+        let energy = self.energy.iter();
+        let energy = energy.flat_map(|energy| [&energy.total, &energy.power]);
+        let lets = self.lets.iter().map(|(_, formula)| formula);
+        let drives = self.drive.iter().flat_map(Drive::formulas);
+        lets.chain(self.motion.formulas())
+            .chain(energy)
+            .chain(drives)
+    }
+}
+
 impl Motion {
     pub(super) fn formulas(&self) -> Box<dyn Iterator<Item = &Located<Formula>> + '_> {
         match self {
