@@ -34,7 +34,7 @@ pub struct LevenbergMarquardt {
 impl LevenbergMarquardt {
     /// The values with which fits run unless a request says otherwise.
     pub const USUAL: Self = Self {
-        most_steps: 100,
+        most_steps: 400,
         enough_to_estimate: 1e-6,
         enough_to_compare: 1e-4,
         enough_to_choose: 1e-3,
