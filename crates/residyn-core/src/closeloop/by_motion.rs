@@ -23,10 +23,17 @@ const PARTS: usize = 2;
 /// Stretches of each part: one that is slow, say, has others beside it.
 const STRETCHES: usize = 4;
 /// Most steps of a fit that only has to show whether motion says more: it starts near its end.
-const TRIAL: LevenbergMarquardt = LevenbergMarquardt {
-    most_steps: 6,
-    ..LevenbergMarquardt::USUAL
-};
+const TRIAL: LevenbergMarquardt = at_most(6);
+/// Most steps of an estimate, which starts near its end as well: a limb whose motion leaves it in a long valley keeps what
+/// the torques say of the rest.
+const ESTIMATE: LevenbergMarquardt = at_most(100);
+
+const fn at_most(most_steps: usize) -> LevenbergMarquardt {
+    LevenbergMarquardt {
+        most_steps,
+        ..LevenbergMarquardt::USUAL
+    }
+}
 
 impl Refined<'_> {
     /// The declared and the chosen model by motion, limb by limb, wherever a fit to motion predicts stretches of the logs
@@ -81,6 +88,7 @@ impl<'l> Comparison<'l> {
         let widths = of_joints(&whole.smoothing_velocities, limb.joints());
         let problem = |errors| Problem {
             held: whole.held.clone(),
+            solver: &ESTIMATE,
             ..limb.problem(whole, &NOTHING, errors)
         };
         let (motion, torques) = (
