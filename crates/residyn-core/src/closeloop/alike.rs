@@ -97,14 +97,12 @@ impl Usual {
     /// of the joints have this one, or it is simpler; the other is not usual itself, or among fewer joints.
     pub fn replaces(&self, other: &FittedEffect, all: &[Self]) -> bool {
         let [own, their] = [&self.effect.effect, &other.effect];
-        let is_confused =
-            own.confused_with.contains(&their.name) || their.confused_with.contains(&own.name);
         let is_simpler = own.parameters.len() < their.parameters.len();
         let mut as_usual = all
             .iter()
             .filter(|usual| usual.joints.len() >= self.joints.len());
         self.joints.contains(&other.joint)
-            && is_confused
+            && own.is_confused_with(their)
             && (self.is_of_most || is_simpler)
             && !as_usual.any(|usual| usual.is_of(other))
     }

@@ -134,9 +134,8 @@ impl<'l> Comparison<'l> {
         if !is_better {
             return None;
         }
-        let problem = stable(&self.motion, model);
-        let coarse = estimate(&problem, model).ok()?;
-        let fine = problem.refined();
+        let coarse = estimate(&stable(&self.motion, model), model).ok()?;
+        let fine = self.fine(model);
         let found = estimate(&fine, &coarse.model).ok()?;
         let uncertainty = uncertainty(&fine.shooting, &found.fit);
         Some(with_intervals(&fine, &found, &uncertainty, &coarse.model))
@@ -177,7 +176,7 @@ pub(super) fn estimate(problem: &Problem<'_>, model: &Model) -> Result<Fitted, F
 }
 
 /// Sums of the squared position errors in these windows, one per joint.
-pub(super) fn squares(problem: &Problem<'_>, model: &Model, windows: &[Window]) -> Vec<f64> {
+fn squares(problem: &Problem<'_>, model: &Model, windows: &[Window]) -> Vec<f64> {
     let (dynamics, step_s) = (model.dynamics(), problem.shooting.longest_s());
     let errors = errors_in(&dynamics, problem.logs, windows, step_s);
     let of_joint = |j: usize| errors.iter().map(|error| error.position[j]).sum();
@@ -185,7 +184,7 @@ pub(super) fn squares(problem: &Problem<'_>, model: &Model, windows: &[Window]) 
 }
 
 /// The logarithm of the ratios of two such sums, on average: joints count alike, however far they move.
-pub(super) fn log_ratio(own: &[f64], other: &[f64]) -> f64 {
+fn log_ratio(own: &[f64], other: &[f64]) -> f64 {
     let of_joint = |(own, other): (&f64, &f64)| (own / other).ln();
     own.iter().zip(other).map(of_joint).sum::<f64>() / own.len() as f64
 }

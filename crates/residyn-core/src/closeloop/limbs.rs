@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::alike::{Part, agree};
+use super::command_path;
 use super::diagnostics::diagnose;
 use super::error::StudyError;
 use super::error_model::ErrorModel;
@@ -16,7 +17,6 @@ use super::gravity::shares_of_gravity;
 use super::judge::{Found, mark};
 use super::plainer::Unused;
 use super::problem::Problem;
-use super::searched::Searched;
 use super::select::{Rival, Round, Tried};
 use super::stage::Watch;
 use crate::data::{Audit, Joint, Log};
@@ -98,7 +98,7 @@ impl Limb {
         let problem = self.problem(whole, whole.library, whole.error_model);
         Ok(Part {
             joints: self.joints.clone(),
-            searched: Searched::by(problem.fit_declared()?, &self.apart, rng, watch)?,
+            searched: command_path::searched(problem.fit_declared()?, &self.apart, rng, watch)?,
         })
     }
 

@@ -9,6 +9,7 @@ mod alike;
 mod by_log;
 mod by_motion;
 mod calibrate;
+mod command_path;
 mod diagnostics;
 mod discriminate;
 mod drive_gain;
@@ -51,6 +52,7 @@ mod tests;
 mod tie;
 mod torque_column;
 mod torque_sign;
+mod torques_first;
 mod verdict;
 
 pub use by_log::OfLog;

@@ -7,13 +7,13 @@
 use rayon::prelude::*;
 
 use super::alike::usual;
-use super::by_motion::{Comparison, by_limbs, estimate, log_ratio, squares};
+use super::by_motion::{Comparison, by_limbs, estimate};
 use super::establish::Standing;
 use super::judge::{Found, mark};
 use super::limbs::Limb;
 use super::plainer::Unused;
 use super::select::{p_value, parts};
-use crate::model::{Effect, Entry, FittedEffect, Model, Status};
+use crate::model::{Effect, FittedEffect, Model, Status};
 
 /// An effect that another may replace.
 #[derive(Clone)]
@@ -23,7 +23,7 @@ struct Doubt {
     /// On the same joint.
     instead: FittedEffect,
     is_usual: bool,
-    /// The largest rise of the error with which it does, as a logarithm.
+    /// The largest rise of the loss with which it does, as a logarithm.
     most: f64,
 }
 
@@ -100,8 +100,7 @@ impl Found<'_> {
         let Ok(first) = estimate(&trial, &own) else {
             return Vec::new();
         };
-        let error = |model: &Model| squares(&trial, model, &trial.shooting.windows);
-        let (mut best, mut least) = (first.model.clone(), error(&first.model));
+        let (mut least, mut best) = (first.loss(), first.model);
         let mut decided: Vec<Doubt> = Vec::new();
         for doubt in doubts {
             if decided.iter().any(|known| known.place == doubt.place) {
@@ -113,9 +112,8 @@ impl Found<'_> {
             let Ok(other) = estimate(&trial, &other) else {
                 continue;
             };
-            let found = error(&other.model);
-            if log_ratio(&found, &least) < doubt.most {
-                (best, least) = (other.model, found);
+            if (other.loss() / least).ln() < doubt.most {
+                (least, best) = (other.loss(), other.model);
                 decided.push(doubt);
             }
         }
@@ -160,9 +158,8 @@ fn other_filters<'l>(
     library: &'l [Effect],
     own: &'l FittedEffect,
 ) -> impl Iterator<Item = FittedEffect> + 'l {
-    let is_filter = |effect: &Effect| matches!(effect.entry, Entry::Command(_));
     let others = library.iter().filter(move |other| {
-        is_filter(&own.effect) && is_filter(other) && other.entry != own.effect.entry
+        own.effect.is_filter() && other.is_filter() && other.entry != own.effect.entry
     });
     others.map(|other| FittedEffect {
         values: own.values.clone(),

@@ -3,6 +3,7 @@
 use rand::Rng;
 
 use super::alike::{Part, agree};
+use super::command_path;
 use super::discriminate::discriminate;
 use super::error::StudyError;
 use super::fit::{Declared, fit};
@@ -15,7 +16,6 @@ use super::prepare::{Prepared, prepare};
 use super::refine::refine;
 use super::request::Request;
 use super::score::score;
-use super::searched::Searched;
 use super::stage::Watch;
 use crate::data::{Joint, Log};
 
@@ -95,7 +95,7 @@ pub fn find<'a>(
         return Ok(found);
     }
     let whole = declared.problem.declared;
-    let searched = Searched::by(declared, apart, rng, watch)?;
+    let searched = command_path::searched(declared, apart, rng, watch)?;
     let joints = Joint::all(whole.joints).collect();
     let mut parts = [Part { joints, searched }];
     agree(whole, &mut parts, watch);

@@ -7,10 +7,11 @@ use super::error::StudyError;
 use super::error_model::ErrorModel;
 use super::establish::{Chosen, establish};
 use super::fit::Declared;
+use super::fitted::Fitted;
 use super::judge::{Found, judge};
 use super::loss::Loss;
 use super::plainer::{Plainer, Unused, plainer};
-use super::select::{Selected, Trial, select, select_from};
+use super::select::{Selected, Trial, select, select_beginning_with, select_from};
 use super::stage::{Stage, Watch};
 use crate::data::Log;
 
@@ -33,7 +34,8 @@ impl<'a> Searched<'a> {
         rng: &mut impl Rng,
         watch: &dyn Watch,
     ) -> Result<Self, StudyError> {
-        let mut best = Self::of(declared, watch);
+        let first = declared.problem.by_torques_first(apart, rng, watch);
+        let mut best = Self::beginning_with(first, declared, watch);
         if let Some(slower) = best.with_slower_reversals(watch)? {
             best = slower;
         }
@@ -82,9 +84,13 @@ impl<'a> Searched<'a> {
         }
     }
 
-    fn of(declared: Declared<'a>, watch: &dyn Watch) -> Self {
+    /// A search that begins with the `first` model, or with the declared one if there is none.
+    fn beginning_with(first: Option<Fitted>, declared: Declared<'a>, watch: &dyn Watch) -> Self {
         let Declared { problem, fitted } = &declared;
-        let selected = select(problem, fitted, watch);
+        let selected = match first {
+            Some(first) => select_beginning_with(problem, first, watch),
+            None => select(problem, fitted, watch),
+        };
         let chosen = establish(problem, fitted, selected, watch);
         Self {
             declared,
@@ -100,16 +106,20 @@ impl<'a> Searched<'a> {
             return Ok(None);
         };
         let declared = problem.with_smoothing_velocities(widths).fit_declared()?;
-        let other = Self::of(declared, watch);
+        let first = problem.begins_with_torques();
+        let first = first.then(|| declared.problem.estimate(&self.chosen.after));
+        let first = first.and_then(Result::ok);
+        let other = Self::beginning_with(first, declared, watch);
         Ok((other.loss() < narrowest).then_some(other))
     }
 
     /// A search that begins over short windows and from the declared values, if its loss is lower: with most of the
     /// force missing, fits over longer windows end in minima from which no set of effects looks right, and at which
-    /// other parameters seem undetermined.
+    /// other parameters seem undetermined. Torques have no such minima, and drives that follow targets keep fits out of them.
     fn searched_again(&self, watch: &dyn Watch) -> Option<Self> {
         let Declared { problem, fitted } = &self.declared;
-        if problem.error_model == ErrorModel::InverseDynamics || watch.has_to_end() {
+        let is_near = problem.error_model == ErrorModel::InverseDynamics;
+        if is_near || problem.begins_with_torques() || watch.has_to_end() {
             return None;
         }
         let short = problem.fitted_over_short_windows().ok()?;

@@ -213,6 +213,16 @@ impl Effect {
         names.into_iter().filter(|name| is_measured(name))
     }
 
+    /// Whether one of two effects is listed as easily confused with the other.
+    pub fn is_confused_with(&self, other: &Self) -> bool {
+        self.confused_with.contains(&other.name) || other.confused_with.contains(&self.name)
+    }
+
+    /// Whether the effect delays commands or low-passes them.
+    pub fn is_filter(&self) -> bool {
+        matches!(self.entry, Entry::Command(_))
+    }
+
     /// Whether the effect couples its joint with the next one.
     pub fn is_coupling(&self) -> bool {
         matches!(self.entry, Entry::Coupling(_))

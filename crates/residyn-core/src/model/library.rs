@@ -1,5 +1,5 @@
 use std::path::Path;
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, OnceLock};
 
 use include_dir::{Dir, include_dir};
 
@@ -15,6 +15,7 @@ static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../models");
 static EMBEDDED: LazyLock<Library> = LazyLock::new(|| Library {
     effects: embedded("effects", Effect::from_text).into(),
     probes: embedded("probes", Effect::from_text).into(),
+    of_one_filter: Arc::default(),
 });
 
 /// The effects and systems known by name: the embedded ones and a user's own. A clone shares them.
@@ -42,6 +43,8 @@ static EMBEDDED: LazyLock<Library> = LazyLock::new(|| Library {
 pub struct Library {
     effects: Arc<[Effect]>,
     probes: Arc<[Effect]>,
+    /// Made on first use.
+    of_one_filter: Arc<OnceLock<Vec<Library>>>,
 }
 
 impl Library {
@@ -58,6 +61,7 @@ impl Library {
         Self {
             effects: Arc::default(),
             probes: Arc::default(),
+            of_one_filter: Arc::default(),
         }
     }
 
@@ -72,6 +76,7 @@ impl Library {
         let place = effects.partition_point(|known| known.name < effect.name);
         effects.insert(place, effect);
         self.effects = effects.into();
+        self.of_one_filter = Arc::default();
         self
     }
 
@@ -84,6 +89,22 @@ impl Library {
     /// depends on that variable.
     pub fn probes(&self) -> &[Effect] {
         &self.probes
+    }
+
+    /// The library once for each filter of commands, without the others.
+    pub(crate) fn of_one_filter(&self) -> &[Self] {
+        let with_one = |one: &Effect| {
+            let is_other = |effect: &&Effect| effect.is_filter() && effect.name != one.name;
+            let kept = self.effects.iter().filter(|effect| !is_other(effect));
+            Self {
+                effects: kept.cloned().collect(),
+                probes: self.probes.clone(),
+                of_one_filter: Arc::default(),
+            }
+        };
+        let filters = self.effects.iter().filter(|effect| effect.is_filter());
+        self.of_one_filter
+            .get_or_init(|| filters.map(with_one).collect())
     }
 
     /// The effect of this name.
@@ -191,6 +212,18 @@ mod tests {
     fn the_embedded_effects_are_read_once() {
         let [first, second] = [Library::built_in(), Library::built_in()];
         assert!(std::ptr::eq(first.effects(), second.effects()));
+    }
+
+    #[test]
+    fn a_library_of_one_filter_has_all_other_effects() {
+        let whole = Library::built_in();
+        let filters = whole.effects().iter().filter(|effect| effect.is_filter());
+        let names: Vec<&String> = filters.map(|filter| &filter.name).collect();
+        assert_eq!(names, ["actuator_delay", "actuator_lag"]);
+        for (name, alone) in names.into_iter().zip(whole.of_one_filter()) {
+            assert_eq!(alone.effects().len(), whole.effects().len() - 1);
+            assert!(alone.effect(name).is_ok());
+        }
     }
 
     #[test]

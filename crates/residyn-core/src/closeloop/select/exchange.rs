@@ -22,11 +22,8 @@ pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Exchange>
         let mut rest = fitted.clone();
         let old = rest.model.effects.remove(k);
         let is_like = |new: &&Effect| {
-            let names = |a: &Effect, b: &Effect| a.confused_with.contains(&b.name);
             let is_counted = new.parameters.iter().any(|parameter| parameter.whole);
-            names(&old.effect, new)
-                || names(new, &old.effect)
-                || is_counted && new.name == old.effect.name
+            old.effect.is_confused_with(new) || is_counted && new.name == old.effect.name
         };
         let like: Vec<Effect> = problem.effects().iter().filter(is_like).cloned().collect();
         for new in acting(problem, &like) {

@@ -30,7 +30,7 @@ pub(super) use self::open_loop_check::is_worse;
 pub use self::rivals::Rival;
 pub(super) use self::rivals::rivals;
 pub use self::screen::screen;
-pub(super) use self::search::select_from;
 pub use self::search::{Round, Selected, Tried, select};
+pub(super) use self::search::{select_beginning_with, select_from};
 pub(super) use self::simpler::parts;
 pub(super) use self::trial::Trial;

@@ -78,6 +78,14 @@ pub fn select(problem: &Problem<'_>, declared: &Fitted, watch: &dyn Watch) -> Se
     search.end(chosen)
 }
 
+/// As [`select`], with a search that begins with a model that has effects, fitted to the same errors.
+pub fn select_beginning_with(problem: &Problem<'_>, first: Fitted, watch: &dyn Watch) -> Selected {
+    let mut search = Search::new(problem, watch);
+    let best = search.rounds_from(Trial::of(problem, first));
+    let chosen = best.and_then(|best| search.simplest(&best));
+    search.end(chosen)
+}
+
 /// As [`select`], with a search that begins over short windows, from a fit of the declared model there.
 pub fn select_from(problem: &Problem<'_>, short: &Declared<'_>, watch: &dyn Watch) -> Selected {
     let mut search = Search::new(problem, watch);

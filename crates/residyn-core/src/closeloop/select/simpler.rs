@@ -1,7 +1,7 @@
 use std::ops::Range;
 
 use super::trial::is_consistent;
-use crate::model::{Effect, FittedEffect};
+use crate::model::{Effect, EffectParameter, FittedEffect};
 
 /// Every set in which one effect is replaced by some of the effects that it contains and the set lacks, fewest first.
 /// Only effects at the indices `added` change.
@@ -77,15 +77,57 @@ fn parts_of<'l>(library: &'l [Effect], whole: &Effect) -> Vec<Vec<&'l Effect>> {
     sets
 }
 
-/// A simpler effect that another contains, with the values of the parameters of the same names.
+/// A simpler effect that another contains, with the values of the parameters of the same names or, if there are none, of
+/// the same unit and measure.
 fn part_of(whole: &FittedEffect, part: &Effect) -> FittedEffect {
     let mut fitted = FittedEffect::absent(part, whole.joint);
     let known = whole.effect.parameters.iter().zip(&whole.values);
     for (parameter, slot) in part.parameters.iter().zip(&mut fitted.values) {
-        let mut same = known.clone().filter(|(p, _)| p.name == parameter.name);
-        if let Some((_, (value, _))) = same.next() {
+        let is_same = |(own, _): &(&EffectParameter, _)| own.name == parameter.name;
+        let is_alike = |(own, _): &(&EffectParameter, _)| {
+            own.unit == parameter.unit && own.measure == parameter.measure
+        };
+        let same = known.clone().find(is_same);
+        if let Some((_, (value, _))) = same.or_else(|| known.clone().find(is_alike)) {
             *slot = (*value, None);
         }
     }
     fitted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parts;
+    use crate::data::Joint;
+    use crate::model::{FittedEffect, Library};
+
+    #[test]
+    fn a_simpler_effect_begins_with_the_values_of_the_richer_one() {
+        let library = Library::built_in();
+        for (whole, values, part, value) in [
+            (
+                "stribeck_friction",
+                vec![0.3, 0.5, 0.1],
+                "coulomb_friction",
+                0.3,
+            ),
+            (
+                "torque_speed_limit",
+                vec![1.2, 8.0],
+                "actuator_saturation",
+                1.2,
+            ),
+        ] {
+            let mut whole = FittedEffect::absent(library.effect(whole).unwrap(), Joint::at(0));
+            for (slot, value) in whole.values.iter_mut().zip(values) {
+                slot.0 = value;
+            }
+            let parts = parts(library.effects(), &whole);
+            let part = parts
+                .iter()
+                .find(|known| known.effect.name == part)
+                .unwrap();
+            assert_eq!(part.values[0].0, value);
+        }
+    }
 }
