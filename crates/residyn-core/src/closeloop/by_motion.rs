@@ -26,7 +26,7 @@ const STRETCHES: usize = 4;
 const TRIAL: LevenbergMarquardt = at_most(6);
 /// Most steps of an estimate, which starts near its end as well: a limb whose motion leaves it in a long valley keeps what
 /// the torques say of the rest.
-const ESTIMATE: LevenbergMarquardt = at_most(100);
+const ESTIMATE: LevenbergMarquardt = at_most(20);
 
 const fn at_most(most_steps: usize) -> LevenbergMarquardt {
     LevenbergMarquardt {

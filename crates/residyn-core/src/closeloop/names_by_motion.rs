@@ -1,8 +1,8 @@
 //! Stage 5, at its end: names that the torques of drives' laws leave in doubt, decided by the motion under the commands.
 //!
-//! Torques tell a delay from a lag, or Stribeck friction from dry friction, by what a low-pass filter leaves of reversals and
-//! late commands. The motion tells by the whole. So where joints that are alike have another effect, a simpler one would
-//! do, or a command is delayed in one way or the other, both are fitted to the motion, from where the torques ended.
+//! Torques tell Stribeck friction from dry friction, or a limit that falls with speed from one that does not, by what a
+//! low-pass filter leaves of reversals and peaks. The motion tells by the whole. So where joints that are alike have another
+//! effect, or a simpler one would do, both are fitted to the motion, from where the torques ended.
 
 use rayon::prelude::*;
 
@@ -13,7 +13,7 @@ use super::judge::{Found, mark};
 use super::limbs::Limb;
 use super::plainer::Unused;
 use super::select::{p_value, parts};
-use crate::model::{Effect, FittedEffect, Model, Status};
+use crate::model::{FittedEffect, Model, Status};
 
 /// An effect that another may replace.
 #[derive(Clone)]
@@ -23,13 +23,11 @@ struct Doubt {
     /// On the same joint.
     instead: FittedEffect,
     is_usual: bool,
-    /// The largest rise of the loss with which it does, as a logarithm.
-    most: f64,
 }
 
 impl Found<'_> {
     /// Replace effects by what their joint's like have, or by a simpler one that they contain, where that predicts the
-    /// motion as well, and a delay or a lag by the other where that predicts it better.
+    /// motion as well.
     pub(super) fn decide_by_motion(&mut self) {
         if !self.problem.is_by_law() {
             return;
@@ -49,7 +47,6 @@ impl Found<'_> {
     /// What may stand in place of the effects that were added.
     fn doubts(&self) -> Vec<Doubt> {
         let (problem, chosen) = (&self.problem, &self.chosen);
-        let settings = &problem.settings.select;
         let found: Vec<(FittedEffect, Status)> = (chosen.standings.iter())
             .map(|standing| (standing.effect.clone(), standing.status))
             .collect();
@@ -61,18 +58,14 @@ impl Found<'_> {
             let like = usual.iter().filter(|new| new.replaces(own, &usual));
             let like = like.map(|usual| usual.effect.on(own.joint));
             let as_good = like.chain(parts(problem.effects(), own));
-            let as_good = as_good.map(|instead| (instead, settings.negligible_rise.ln_1p()));
-            let better = other_filters(problem.effects(), own);
-            let better = better.map(|instead| (instead, (-settings.round_gain).ln_1p()));
             let mut doubts: Vec<Doubt> = Vec::new();
-            for (instead, most) in as_good.chain(better) {
+            for instead in as_good {
                 let is_new = !doubts.iter().any(|known| known.instead.is_same(&instead));
                 if is_new && is_free(&instead) {
                     doubts.push(Doubt {
                         place,
                         is_usual: usual.iter().any(|usual| usual.is_of(&instead)),
                         instead,
-                        most,
                     });
                 }
             }
@@ -101,6 +94,7 @@ impl Found<'_> {
             return Vec::new();
         };
         let (mut least, mut best) = (first.loss(), first.model);
+        let negligible = self.problem.settings.select.negligible_rise;
         let mut decided: Vec<Doubt> = Vec::new();
         for doubt in doubts {
             if decided.iter().any(|known| known.place == doubt.place) {
@@ -112,7 +106,7 @@ impl Found<'_> {
             let Ok(other) = estimate(&trial, &other) else {
                 continue;
             };
-            if (other.loss() / least).ln() < doubt.most {
+            if other.loss() < least * (1.0 + negligible) {
                 (least, best) = (other.loss(), other.model);
                 decided.push(doubt);
             }
@@ -151,18 +145,4 @@ impl Found<'_> {
         chosen.after = after;
         mark(&mut chosen.after.model, &chosen.standings);
     }
-}
-
-/// A delay in place of a lag, and the other way round, with the same time.
-fn other_filters<'l>(
-    library: &'l [Effect],
-    own: &'l FittedEffect,
-) -> impl Iterator<Item = FittedEffect> + 'l {
-    let others = library.iter().filter(move |other| {
-        own.effect.is_filter() && other.is_filter() && other.entry != own.effect.entry
-    });
-    others.map(|other| FittedEffect {
-        values: own.values.clone(),
-        ..FittedEffect::absent(other, own.joint)
-    })
 }
