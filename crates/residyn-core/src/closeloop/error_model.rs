@@ -26,21 +26,16 @@ impl Problem<'_> {
 }
 
 impl ErrorModel {
-    /// Whether these errors can show an effect. Torques are computed from the motion as it was read, and a torque that was
-    /// logged must follow from the one that acts: an effect that explains any command would always fit. The torque that a
-    /// drive's law asks for is known, whatever limits it.
+    /// Whether these errors can show an effect. Torques are computed from the motion as it was read, and the torque
+    /// that acts must determine the command: an effect that explains any command would always fit.
     fn shows(self, effect: &Effect, driven_by: Quantity) -> bool {
-        let is_by_law = driven_by == Quantity::Command;
         match self {
             Self::OutputError => effect.shows_in == ShowsIn::Any,
-            Self::InverseDynamics => match effect.entry {
-                Entry::Reading(_) => false,
-                Entry::Torque(_) if is_by_law => true,
-                _ => {
-                    effect.distinguishes_command()
-                        && (effect.shows_in != ShowsIn::LawTorques || is_by_law)
-                }
-            },
+            Self::InverseDynamics => {
+                !matches!(effect.entry, Entry::Reading(_))
+                    && effect.distinguishes_command()
+                    && (effect.shows_in != ShowsIn::LawTorques || driven_by == Quantity::Command)
+            }
         }
     }
 
