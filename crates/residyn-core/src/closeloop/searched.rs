@@ -34,14 +34,18 @@ impl<'a> Searched<'a> {
         rng: &mut impl Rng,
         watch: &dyn Watch,
     ) -> Result<Self, StudyError> {
-        let first = declared.problem.by_torques_first(apart, rng, watch);
+        let Declared { problem, fitted } = &declared;
+        let first = problem.by_torques_first(fitted, apart, rng, watch);
+        let is_near = first.is_some() || problem.error_model == ErrorModel::InverseDynamics;
         let mut best = Self::beginning_with(first, declared, watch);
         if let Some(slower) = best.with_slower_reversals(watch)? {
             best = slower;
         }
         watch.see(Stage::Diagnostics.into());
         let mut left = best.diagnose(rng);
+        // Torques have no false minima.
         if (left.is_significant() || best.chosen.failure.is_some())
+            && !is_near
             && let Some(other) = best.searched_again(watch)
         {
             best = other;
@@ -115,11 +119,10 @@ impl<'a> Searched<'a> {
 
     /// A search that begins over short windows and from the declared values, if its loss is lower: with most of the
     /// force missing, fits over longer windows end in minima from which no set of effects looks right, and at which
-    /// other parameters seem undetermined. Torques have no such minima, and drives that follow targets keep fits out of them.
+    /// other parameters seem undetermined.
     fn searched_again(&self, watch: &dyn Watch) -> Option<Self> {
         let Declared { problem, fitted } = &self.declared;
-        let is_near = problem.error_model == ErrorModel::InverseDynamics;
-        if is_near || problem.begins_with_torques() || watch.has_to_end() {
+        if watch.has_to_end() {
             return None;
         }
         let short = problem.fitted_over_short_windows().ok()?;

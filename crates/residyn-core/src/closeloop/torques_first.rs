@@ -21,9 +21,11 @@ impl<'a> Problem<'a> {
     }
 
     /// The model that a search by torques ends with, fitted to the motion; `None` if the problem does not begin with
-    /// torques, or if either fit fails.
+    /// torques, if either fit fails, or if the `declared` model fits the motion better: torques between rows that are too
+    /// far apart, under a law whose gains are unknown too, are least where every parameter is zero.
     pub(super) fn by_torques_first(
         &self,
+        declared: &Fitted,
         apart: &[Log],
         rng: &mut impl Rng,
         watch: &dyn Watch,
@@ -31,10 +33,11 @@ impl<'a> Problem<'a> {
         if !self.begins_with_torques() {
             return None;
         }
-        let declared = self.in_torques().fit_declared().ok()?;
-        let found = command_path::searched(declared, apart, rng, watch).ok()?;
+        let in_torques = self.in_torques().fit_declared().ok()?;
+        let found = command_path::searched(in_torques, apart, rng, watch).ok()?;
         let start_states = self.shooting.initial_start_states(0);
-        (self.refit(&found.chosen.after.model, start_states, None)).ok()
+        let first = (self.refit(&found.chosen.after.model, start_states, None)).ok()?;
+        (first.loss() < declared.loss()).then_some(first)
     }
 
     /// The same logs and model, with torques compared.
