@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use residyn::{Library, read_log, read_model};
+use residyn::{Library, Log, read_log, read_model, rng};
+use residyn_core::closeloop::{Declared, Problem, Settings, unexplained};
 use residyn_core::sim::metric::{assess, torque_error};
 
 use crate::support::tables::{rows, says_words};
@@ -205,7 +206,7 @@ fn a_log_without_the_column_is_refused() {
 
 #[test]
 fn logs_in_memory_without_the_column_are_refused() {
-    use residyn::{Channels, Request, close_loop, rng};
+    use residyn::{Channels, Request, close_loop};
     let library = Library::built_in();
     let model = library.model_from_text("joint.toml", JOINT).unwrap();
     let time: Vec<f64> = (0..400).map(|row| 0.01 * f64::from(row)).collect();
@@ -300,6 +301,53 @@ fn units_of_measured_columns_are_checked() {
         &scratch.answers("check odd.toml"),
         &["the unit `furlong` of `u_volts` is not a product of SI units"],
     );
+}
+
+/// A log of a joint whose grease is warm and cold in turn, other than the time goes.
+fn changing_log(number: f64) -> String {
+    log(
+        "time,q1,qd1,tau1,u_temp,u_note",
+        20.0,
+        |time| {
+            [
+                1.2 * tones(time, number),
+                313.0 + 20.0 * (0.7 * time + number).sin(),
+            ]
+        },
+        |qd, [torque, temp]| {
+            let friction = DAMPING * (-FADING * (temp - 293.0)).exp() * qd;
+            (torque - friction) / 0.02
+        },
+    )
+}
+
+#[test]
+fn a_residual_that_goes_with_a_column_is_said_to() {
+    let scratch = scratch();
+    let undeclared = JOINT.replace("[measured]\nu_temp = \"K\"\n", "");
+    let viscous = "\n[[effect]]\nname = \"viscous_friction\"\njoint = 1\nb = 0.03\n";
+    scratch.file("joint.toml", undeclared + viscous);
+    let library = Library::built_in();
+    let model = read_model(scratch.path("joint.toml"), &library).unwrap();
+    let logs: Vec<Log> = (1..=4)
+        .map(|k| {
+            // A column that is not made of numbers is left out.
+            let text = changing_log(f64::from(k)).replace('\n', ",warm\n");
+            let text = text.replacen(",warm", "", 1);
+            read_log(scratch.file(&format!("run{k}.csv"), text), &model).unwrap()
+        })
+        .collect();
+    assert!(
+        logs[0]
+            .notes
+            .iter()
+            .any(|note| note.contains("\"u_note\" is ignored"))
+    );
+    let (settings, nothing) = (Settings::default(), Library::empty());
+    let problem = Problem::new(&model, &nothing, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let left = unexplained(&problem, library.probes(), &fitted, &fitted, &mut rng(0));
+    assert_eq!(left.place, "u_temp", "{left:?}");
 }
 
 /// Command lines that run a model without a log.

@@ -125,6 +125,21 @@ impl Model {
         self.measured.iter().map(|quantity| quantity.name.as_str())
     }
 
+    /// The same model, whose effects may read these further measured columns as well, in units that are not known.
+    #[must_use]
+    pub(crate) fn reading<'n>(&self, columns: impl IntoIterator<Item = &'n str>) -> Self {
+        let mut model = self.clone();
+        for name in columns {
+            if self.measured_names().all(|own| own != name) {
+                model.measured.push(MeasuredQuantity {
+                    name: name.to_owned(),
+                    unit: String::new(),
+                });
+            }
+        }
+        model
+    }
+
     /// Refuses a model that reads further measured columns, for what runs it without a log: `what`, such as "an exported
     /// file".
     ///

@@ -2,6 +2,7 @@
 
 mod curve;
 mod force;
+mod measured_probes;
 mod omnibus;
 mod proposal;
 mod residual;

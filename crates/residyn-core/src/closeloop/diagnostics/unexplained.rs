@@ -3,12 +3,13 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::measured_probes::measured_probes;
 use super::omnibus::{Omnibus, omnibus};
 use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::select::{Folds, Losses, acting, gain, p_value};
-use crate::data::Joint;
+use crate::data::{Joint, is_measured};
 use crate::model::{Effect, FittedEffect};
 
 /// The unexplained residual: what the residuals hold beyond noise when no effect helps any more.
@@ -21,8 +22,8 @@ pub struct Unexplained {
     /// probes with a noteworthy gain.
     #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
-    /// The variable that most of the residual depends on: `q1`, `qd2`, `tau1`, `t`, products of these such as `q1*qd1`,
-    /// `unknown` if it depends on none of them, `none` if it is not significant.
+    /// The variable that most of the residual depends on: `q1`, `qd2`, `tau1`, `t`, a further measured column of the logs
+    /// such as `u_temp`, products of these such as `q1*qd1`, `unknown` if it depends on none of them, `none` if it is not significant.
     #[serde(rename = "where")]
     pub place: String,
     /// The joint with the largest unexplained residual.
@@ -82,7 +83,7 @@ pub fn diagnose(
 }
 
 /// Test whether the residuals are more than noise, whatever their shape, and probe them with flexible shapes over each
-/// variable. Probes name no effect; they lower the loss on left-out blocks as an unknown effect would.
+/// variable and each further measured column that all logs have. Probes name no effect; they lower the loss on left-out blocks as an unknown effect would.
 pub fn unexplained(
     problem: &Problem<'_>,
     probes: &[Effect],
@@ -92,9 +93,21 @@ pub fn unexplained(
 ) -> Unexplained {
     let omnibus = omnibus(problem, before, after, rng);
     let losses = Losses::by(problem, &Folds::of(problem).alone(), after);
-    let ask = |probe| ask(problem, after, probe, &losses);
-    let probes = acting(problem, probes).into_par_iter();
-    let probed: Vec<Probed> = probes.filter_map(ask).collect();
+    let of_library = (after, acting(problem, probes));
+    let of_columns = measured_probes(problem, after);
+    let of_columns = of_columns
+        .iter()
+        .map(|(model, probes)| (model, probes.clone()));
+    let asked = |(model, probes): (&Fitted, Vec<FittedEffect>)| -> Vec<Probed> {
+        let probes = probes.into_par_iter();
+        let ask = |probe| ask(problem, model, probe, &losses);
+        probes.filter_map(ask).collect()
+    };
+    let probed: Vec<Probed> = [of_library]
+        .into_iter()
+        .chain(of_columns)
+        .flat_map(asked)
+        .collect();
     let asked = probed.len().max(1) as f64;
     let noteworthy = problem.settings.diagnostics.noteworthy_share;
     let seen = probed.iter().filter(|p| p.gain > noteworthy);
@@ -155,7 +168,7 @@ fn place(problem: &Problem<'_>, omnibus: &Omnibus, probed: &[Probed]) -> (String
 /// A probe is named by its variables; those of a joint carry the joint's number.
 fn variables(probe: &FittedEffect) -> String {
     let numbered = |name: &str| match name {
-        "t" => name.to_owned(),
+        of_no_joint if of_no_joint == "t" || is_measured(of_no_joint) => name.to_owned(),
         own => probe.joint.name(own),
     };
     let names: Vec<String> = probe.effect.name.split('*').map(numbered).collect();
