@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use residyn::{Library, Log, read_log, read_model, rng};
+use residyn::{Library, Log, Model, read_log, read_model, rng};
 use residyn_core::closeloop::{Declared, Problem, Settings, unexplained};
 use residyn_core::sim::metric::{assess, torque_error};
 
@@ -62,12 +62,12 @@ const FADING: f64 = 0.03;
 type Given = [f64; 2];
 
 /// A log of a rig at rest with a row every 10 ms, integrated apart from the library's own steppers, in steps of a tenth of
-/// a millisecond; `acceleration` is that of speed and what is given, which is held over each row.
+/// a millisecond; `acceleration` is that of the speed, of what is given, which is held over each row, and of the row's time.
 fn log(
     header: &str,
     seconds: f64,
     given: impl Fn(f64) -> Given,
-    acceleration: impl Fn(f64, Given) -> f64,
+    acceleration: impl Fn(f64, Given, f64) -> f64,
 ) -> String {
     let (mut q, mut qd) = (0.0_f64, 0.0_f64);
     let mut text = format!("{header}\n");
@@ -81,8 +81,8 @@ fn log(
         writeln!(text, "{time},{:?},{qd:?},{driven:?},{column:?}", q + noise).unwrap();
         for _ in 0..100 {
             let step = 1e-4;
-            let middle = qd + 0.5 * step * acceleration(qd, held);
-            let slope = acceleration(middle, held);
+            let middle = qd + 0.5 * step * acceleration(qd, held, time);
+            let slope = acceleration(middle, held, time);
             q += step * (qd + 0.5 * step * slope);
             qd += step * slope;
         }
@@ -106,11 +106,14 @@ fn motor_log(header: &str, number: f64) -> String {
         header,
         20.0,
         |time| [tones(time, number), volts(time, number)],
-        |qd, [duty, volts]| {
-            let torque = TORQUE_CONSTANT * (volts * duty - 0.3 * qd) / 2.0;
-            (torque - FRICTION * (qd / 2e-3).tanh()) / 0.02
-        },
+        |qd, given, _| motor(qd, given),
     )
+}
+
+/// The acceleration of the motor as it is.
+fn motor(qd: f64, [duty, volts]: Given) -> f64 {
+    let torque = TORQUE_CONSTANT * (volts * duty - 0.3 * qd) / 2.0;
+    (torque - FRICTION * (qd / 2e-3).tanh()) / 0.02
 }
 
 /// Grease that warms by 40 K within a log.
@@ -119,7 +122,7 @@ fn joint_log(number: f64) -> String {
         "time,q1,qd1,tau1,u_temp",
         30.0,
         |time| [1.2 * tones(time, number), 293.0 + 40.0 * time / 30.0],
-        |qd, [torque, temp]| {
+        |qd, [torque, temp], _| {
             let friction = DAMPING * (-FADING * (temp - 293.0)).exp() * qd;
             (torque - friction) / 0.02
         },
@@ -173,6 +176,30 @@ fn a_drive_follows_the_supply_from_row_to_row() {
         torques < 0.02 && torques < 0.2 * torques_at_constant,
         "{errors:?}"
     );
+}
+
+/// The command waits, and the supply does not.
+#[test]
+fn a_delay_holds_back_the_command_alone() {
+    let scratch = scratch();
+    let late = "\n[[effect]]\nname = \"actuator_delay\"\njoint = 1\nd = 0.02\n";
+    scratch.file("late.toml", true_motor() + late);
+    // Two rows, before which the duty cycle was that of the first.
+    let logged = log(
+        STANDARD,
+        20.0,
+        |time| [tones(time, 1.0), volts(time, 1.0)],
+        |qd, _, time| motor(qd, [tones((time - 0.02).max(0.0), 1.0), volts(time, 1.0)]),
+    );
+    scratch.file("run.csv", logged);
+    let model = read_model(scratch.path("late.toml"), &Library::built_in()).unwrap();
+    let log = read_log(scratch.path("run.csv"), &model).unwrap();
+    let prompt = model.with_effects(vec![model.effects[0].clone()]);
+    let error = |model: &Model| {
+        assess(&model.dynamics(), std::slice::from_ref(&log), &[0.5]).position_rms()
+    };
+    assert!(error(&model) < 2e-3, "{}", error(&model));
+    assert!(error(&prompt) > 5.0 * error(&model), "{}", error(&prompt));
 }
 
 #[test]
@@ -314,7 +341,7 @@ fn changing_log(number: f64) -> String {
                 313.0 + 20.0 * (0.7 * time + number).sin(),
             ]
         },
-        |qd, [torque, temp]| {
+        |qd, [torque, temp], _| {
             let friction = DAMPING * (-FADING * (temp - 293.0)).exp() * qd;
             (torque - friction) / 0.02
         },
