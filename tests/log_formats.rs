@@ -16,10 +16,9 @@ fn read(path: &Path) -> Result<Log, String> {
 #[test]
 fn files_that_are_not_read_get_the_line_that_converts_them() {
     let folder = tempfile::tempdir().unwrap();
-    let cases: [(&[u8], &str); 7] = [
+    let cases: [(&[u8], &str); 6] = [
         (b"#ROSBAG V2.0\n", "rosbags-convert"),
-        (b"\x89HDF\r\n\x1a\n", "h5py"),
-        (b"MATLAB 7.3 MAT-file", "h5py"),
+        (b"\x89HDF\r\n\x1a\n", "is not a complete HDF5 file"),
         (b"MATLAB 5.0 MAT-file", "save('run.mat'"),
         (b"\x28\xb5\x2f\xfd", "zstd -d"),
         (b"PAR1\x15\x04", "is not a complete Parquet file"),
@@ -57,6 +56,11 @@ mod slow {
             "none.parquet",
             "lists.parquet",
             "double.pt",
+            "plain.h5",
+            "chunked.h5",
+            "big_endian.h5",
+            "latest.h5",
+            "seven.mat",
         ] {
             let found = read(&folder.join(name)).unwrap();
             let channels = |log: &Log| {
@@ -69,7 +73,7 @@ mod slow {
             };
             assert!(channels(&found) == channels(&wanted), "{name}");
         }
-        for name in ["integers.npz", "integers.mat"] {
+        for name in ["integers.npz", "integers.mat", "integers.h5"] {
             let counts = read(&folder.join(name)).unwrap();
             assert_eq!((counts.time[7], counts.q[0][1]), (7.0, 4.0), "{name}");
         }
@@ -77,6 +81,7 @@ mod slow {
             ("short.npz", "short.npz, row 48, column \"tau1\": is empty"),
             ("gap.npz", "row 5, column \"q2\": \"NaN\" is not a finite"),
             ("gap.mat", "row 5, column \"q2\": \"NaN\" is not a finite"),
+            ("gap.h5", "row 5, column \"q2\": \"NaN\" is not a finite"),
             (
                 "gap.parquet",
                 "row 5, column \"q2\": \"NaN\" is not a finite",
@@ -140,7 +145,7 @@ mod slow {
         for (name, words) in [
             (
                 "robots.pt",
-                "robots.pt: tensor \"dof_pos\" has the shape [3, 50, 2]; save one row per sample",
+                "robots.pt: array \"dof_pos\" has the shape [3, 50, 2]; save one row per sample",
             ),
             ("wrong_names.pt", "has 2 columns, and 1 joints have names"),
             (
@@ -155,6 +160,43 @@ mod slow {
             says(&read(name, &pace).unwrap_err(), &[words]);
         }
         assert!(!folder.join("executed").exists());
+    }
+
+    /// Arrays in groups, by the names that recorders of demonstrations give them, and one run of a file of several.
+    #[test]
+    fn a_file_of_arrays_in_groups_is_a_log() {
+        let Some(folder) = formats() else { return };
+        let rig = Columns {
+            joint_names: vec!["elbow".into(), "wrist".into()],
+            driven_by: Quantity::Command,
+            ..Columns::default()
+        };
+        let read = |name: &str, columns: &Columns| {
+            let log = read_rig_log(folder.join(name), 2, columns);
+            log.map_err(|error| error.to_string())
+        };
+        let wanted = self::read(&folder.join("run.csv")).unwrap();
+        for name in ["episode.hdf5", "named.hdf5"] {
+            let log = read(name, &rig).unwrap();
+            assert!(log.q == wanted.q && log.tau == wanted.tau, "{name}");
+        }
+        let unnamed = Columns {
+            driven_by: Quantity::Command,
+            ..Columns::default()
+        };
+        let log = read("demos.hdf5#demo_3", &unnamed).unwrap();
+        assert!(log.q[0] == wanted.q[1] && log.q[1] == wanted.q[0]);
+        says(&log.notes.join("\n"), &["names no joints"]);
+        for (name, words) in [
+            (
+                "demos.hdf5",
+                "in demo_0, demo_1, demo_2 and 2 more; name one: ",
+            ),
+            ("demos.hdf5", "demos.hdf5#demo_0\""),
+            ("demos.hdf5#demo_9", "has no arrays in \"demo_9\""),
+        ] {
+            says(&read(name, &unnamed).unwrap_err(), &[words]);
+        }
     }
 
     /// Positions and commands of an episode, by the names of the joints.
@@ -206,6 +248,10 @@ mod slow {
             "packed.mat",
             "matrices.npz",
             "named.pt",
+            "plain.h5",
+            "chunked.h5",
+            "latest.h5",
+            "seven.mat",
             "snappy.parquet",
             "none.parquet",
             "lists.parquet",

@@ -15,6 +15,7 @@ import sys
 import types
 import zipfile
 
+import h5py
 import numpy
 import pyarrow
 import pyarrow.parquet
@@ -50,6 +51,40 @@ for name, packed in [("plain.mat", False), ("packed.mat", True)]:
 scipy.io.savemat(folder / "columns.mat", {name: table[:, [k]] for k, name in enumerate(names)})
 scipy.io.savemat(folder / "integers.mat", ticks)
 scipy.io.savemat(folder / "gap.mat", {**channels, "q": gap})
+
+
+
+def hdf5(name, arrays, chunked=None, **attributes):
+    """Arrays by their paths, with attributes of the file."""
+    with h5py.File(folder / name, "w") as file:
+        file.attrs.update(attributes)
+        for path, values in arrays.items():
+            file.create_dataset(path, data=values, **(chunked or {}))
+
+
+beside = {"camera": numpy.zeros((len(table), 4, 4, 3), dtype=numpy.uint8), "frames": numpy.zeros((len(table), 5000), dtype=numpy.uint8), "note": "left arm"}
+hdf5("plain.h5", {**channels, **beside})
+hdf5("chunked.h5", {f"run/{name}": values for name, values in channels.items()}, {"chunks": True, "compression": "gzip", "shuffle": True, "fletcher32": True})
+hdf5("big_endian.h5", {name: values.astype(">f8") for name, values in channels.items()})
+with h5py.File(folder / "latest.h5", "w", libver="latest") as file:
+    for name, values in channels.items():
+        file.create_dataset(name, data=values, chunks=(7,) + values.shape[1:], maxshape=(None,) + values.shape[1:])
+    file["loop"] = file["/"]
+hdf5("integers.h5", ticks)
+hdf5("gap.h5", {**channels, "q": gap})
+# As recorders of demonstrations keep them: groups of runs, and joints in their own order.
+turned = {"time": table[:, 0], "observations/qpos": table[:, 2:0:-1], "observations/qvel": table[:, 4:2:-1], "action": table[:, 6:4:-1]}
+hdf5("episode.hdf5", turned, joint_names=["wrist", "elbow"])
+hdf5("named.hdf5", {**turned, "joint_names": ["wrist", "elbow"]})
+hdf5("demos.hdf5", {f"data/demo_{k}/{name}": values for k in range(5) for name, values in turned.items()})
+with h5py.File(folder / "seven.mat", "w", userblock_size=512) as file:
+    for name, values in {**channels, "note": numpy.array([[ord(letter)] for letter in "left"], dtype=numpy.uint16), "none": numpy.zeros(2, dtype=numpy.uint64)}.items():
+        array = file.create_dataset(f"rig/{name}" if name == "q" else name, data=numpy.atleast_2d(values.T))
+        array.attrs["MATLAB_class"] = numpy.bytes_("char" if name == "note" else "double")
+        if name == "none":
+            array.attrs["MATLAB_empty"] = numpy.uint8(1)
+with open(folder / "seven.mat", "r+b") as file:
+    file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM")
 
 columns = {name: table[:, k] for k, name in enumerate(names)}
 for packing in ["snappy", "gzip", "zstd", "lz4", "none"]:

@@ -188,6 +188,13 @@ pub fn pt() -> Vec<Vec<u8>> {
     )
 }
 
+pub fn hdf5() -> Vec<Vec<u8>> {
+    named(
+        formats(),
+        "plain.h5 chunked.h5 big_endian.h5 latest.h5 integers.h5 episode.hdf5 demos.hdf5 seven.mat",
+    )
+}
+
 /// The descriptions of tensors in these files.
 pub fn pickles() -> Vec<Vec<u8>> {
     let described = |file: Vec<u8>| {

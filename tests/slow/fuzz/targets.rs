@@ -403,6 +403,11 @@ fn pt() {
 }
 
 #[test]
+fn hdf5() {
+    Target::log("hdf5", 2000, seeds::hdf5).run();
+}
+
+#[test]
 fn pickle() {
     Target::log("pickle", 2000, seeds::pickles)
         .packed(packed::pt)

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::csv::Csv;
 use super::source::Source;
-use super::{archive, mat, npy, npz, parquet, pt, recording};
+use super::{archive, hdf5, mat, npy, npz, parquet, pt, recording};
 use residyn_core::data::{Arrays, Columns, LogError, Table};
 
 /// A format of log files.
@@ -22,8 +22,8 @@ pub struct LogFormat {
 /// How a format is recognised.
 #[derive(Debug)]
 enum Mark {
-    /// By its first bytes.
-    Begin(&'static [u8]),
+    /// By its first bytes, any of these.
+    Begin(&'static [&'static [u8]]),
     /// As a zip archive that holds a file of this name.
     Archive(&'static str),
 }
@@ -31,7 +31,7 @@ enum Mark {
 impl Mark {
     fn is_on(&self, begin: &[u8], source: &Source) -> bool {
         match self {
-            Self::Begin(known) => begin.starts_with(known),
+            Self::Begin(known) => known.iter().any(|known| begin.starts_with(known)),
             Self::Archive(name) => {
                 let path = source.plain_file();
                 let path = path.filter(|_| begin.starts_with(archive::BEGIN));
@@ -71,7 +71,7 @@ pub const LOG_FORMATS: &[LogFormat] = &[
         name: "npz",
         about: "logs of NumPy, in",
         endings: &["npz"],
-        mark: Mark::Begin(archive::BEGIN),
+        mark: Mark::Begin(&[archive::BEGIN]),
         reader: Reader::File {
             read: |path, _| npz::read(path),
             packed: "a gzipped .npz is not read; unpack it: `gunzip run.npz.gz`",
@@ -81,21 +81,31 @@ pub const LOG_FORMATS: &[LogFormat] = &[
         name: "npy",
         about: "logs of NumPy, one matrix whose columns go by their numbers, in",
         endings: &["npy"],
-        mark: Mark::Begin(npy::MAGIC),
+        mark: Mark::Begin(&[npy::MAGIC]),
         reader: Reader::Bytes(|name, source| Ok(Box::new(npy::read(name, &source)?))),
     },
     LogFormat {
         name: "mat",
         about: "logs of MATLAB, versions 5 to 7, in",
         endings: &["mat"],
-        mark: Mark::Begin(mat::MAGIC),
+        mark: Mark::Begin(&[mat::MAGIC]),
         reader: Reader::Bytes(|name, source| Ok(Box::new(mat::read(name, &source)?))),
+    },
+    LogFormat {
+        name: "hdf5",
+        about: "logs of h5py, recorders of demonstrations and MATLAB's version 7.3, in",
+        endings: &["h5", "hdf5"],
+        mark: Mark::Begin(&hdf5::BEGIN),
+        reader: Reader::File {
+            read: |path, _| hdf5::read(path),
+            packed: "a gzipped HDF5 file is not read; unpack it: `gunzip run.h5.gz`",
+        },
     },
     LogFormat {
         name: "mcap",
         about: "recordings of robots, joint states in CDR or JSON, in",
         endings: &["mcap"],
-        mark: Mark::Begin(b"\x89MCAP0\r\n"),
+        mark: Mark::Begin(&[b"\x89MCAP0\r\n"]),
         reader: Reader::File {
             read: recording::of_mcap,
             packed: "a packed recording is not read; unpack it: `gunzip run.mcap.gz`",
@@ -105,7 +115,7 @@ pub const LOG_FORMATS: &[LogFormat] = &[
         name: "rosbag2",
         about: "recordings of ROS 2 as .db3 files and folders, in",
         endings: &["db3"],
-        mark: Mark::Begin(b"SQLite format 3\0"),
+        mark: Mark::Begin(&[b"SQLite format 3\0"]),
         reader: Reader::File {
             read: recording::of_bag,
             packed: "a packed recording is not read; unpack it: `gunzip run.db3.gz`",
@@ -115,7 +125,7 @@ pub const LOG_FORMATS: &[LogFormat] = &[
         name: "parquet",
         about: "logs, and data sets of LeRobot, in",
         endings: &["parquet"],
-        mark: Mark::Begin(b"PAR1"),
+        mark: Mark::Begin(&[b"PAR1"]),
         reader: Reader::File {
             read: |path, _| parquet::read(path),
             packed: "a gzipped Parquet file is not read; unpack it: `gunzip run.parquet.gz`",
@@ -125,13 +135,13 @@ pub const LOG_FORMATS: &[LogFormat] = &[
         name: "csv",
         about: "logs, out; in with any separator, decimal commas, and packed with gzip",
         endings: &["csv", "tsv", "csv.gz", "tsv.gz"],
-        mark: Mark::Begin(b""),
+        mark: Mark::Begin(&[b""]),
         reader: Reader::Bytes(|name, source| Ok(Box::new(Csv::of(name, source)?))),
     },
 ];
 
 /// Formats that are recognised but not read: their first bytes, and the line that converts them.
-const FOREIGN: [(&[u8], &str); 4] = [
+const FOREIGN: [(&[u8], &str); 2] = [
     (
         b"#ROSBAG",
         "a ROS 1 bag is not read; convert it: `pip install rosbags && rosbags-convert --src run.bag --dst run`, and read the \
@@ -140,15 +150,6 @@ const FOREIGN: [(&[u8], &str); 4] = [
     (
         b"\x28\xb5\x2f\xfd",
         "is packed with zstd; unpack it: `zstd -d run.db3.zstd`",
-    ),
-    (
-        b"\x89HDF",
-        "HDF5 is not read; convert it: `python -c \"import h5py, numpy; f = h5py.File('run.h5'); numpy.savez('run.npz', **{k: f[k][:] for k in f})\"`",
-    ),
-    (
-        b"MATLAB 7.3",
-        "MATLAB's version 7.3 is HDF5, which is not read; save it with '-v7', or convert it: \
-         `python -c \"import h5py, numpy; f = h5py.File('run.mat'); numpy.savez('run.npz', **{k: f[k][:].T for k in f if k[0] != '#'})\"`",
     ),
 ];
 

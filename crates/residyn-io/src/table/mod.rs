@@ -3,12 +3,14 @@
 mod archive;
 mod arrays;
 mod budget;
+mod channels;
 mod csv;
 #[cfg(feature = "parquet")]
 mod ending;
 #[cfg(feature = "parquet")]
 mod footer;
 mod format;
+mod hdf5;
 #[cfg(feature = "parquet")]
 mod lerobot;
 mod mat;
@@ -81,6 +83,9 @@ fn in_file(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
     #[cfg(feature = "parquet")]
     if let Some(episode) = lerobot::Episode::of(path) {
         return Ok(Box::new(episode.read()?));
+    }
+    if let Some(part) = hdf5::Part::of(path) {
+        return Ok(Box::new(part.read()?));
     }
     if path.is_dir() {
         return Ok(Box::new(recording::of_folder(path, columns)?));

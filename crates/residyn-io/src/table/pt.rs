@@ -10,6 +10,7 @@ use pytorch_reader::{DType, PickleValue, PytorchError, PytorchReader, Tensor};
 
 use super::archive;
 use super::arrays::Unpacked;
+use super::channels::{Channels, JOINTS, is_channel};
 use super::npy::Array;
 use crate::files;
 use residyn_core::data::{Arrays, LogError};
@@ -19,25 +20,6 @@ pub(super) const DESCRIPTION: &str = "data.pkl";
 
 /// Memory that a byte of the description may become: one that stands for an object \[bytes\].
 const OBJECT: u64 = 128;
-
-/// Names of the tensors with a column for each joint, and the stems of the standard names; of several for one stem, the
-/// first is read.
-const CHANNELS: [(&str, &str); 11] = [
-    ("dof_pos", "q"),
-    ("joint_pos", "q"),
-    ("dof_vel", "qd"),
-    ("joint_vel", "qd"),
-    ("des_dof_pos", "cmd"),
-    ("dof_pos_target", "cmd"),
-    ("joint_pos_target", "cmd"),
-    ("targets", "cmd"),
-    ("torques", "tau"),
-    ("dof_torque", "tau"),
-    ("actual_torque", "tau"),
-];
-
-/// Names of the list that names the joints, in the order of their columns.
-const JOINTS: [&str; 3] = ["joint_names", "dof_names", "joint_order"];
 
 /// # Errors
 /// A file that cannot be read, one that holds other objects than tensors, and tensors that are not of numbers.
@@ -55,55 +37,28 @@ fn table(path: &Path, packed: u64) -> Result<Arrays, String> {
         return Err("holds no dictionary; save one of tensors, `torch.save({\"time\": time, \"dof_pos\": q, ..}, path)`".to_owned());
     };
     unpacked.table.notes.extend(left_out(&entries)?);
-    let joints = joints(&entries);
     let mut tensors: Vec<Tensor> = PytorchReader::new(path)
         .map_err(broken)?
         .into_tensors()
         .into_values()
         .collect();
     tensors.sort_by(|a, b| a.name.cmp(&b.name));
-    let names: Vec<String> = tensors.iter().map(|tensor| tensor.name.clone()).collect();
+    let channels = Channels {
+        names: tensors.iter().map(|tensor| tensor.name.clone()).collect(),
+        joints: joints(&entries),
+    };
     for tensor in tensors {
-        add(&mut unpacked, &tensor, stem(&tensor.name, &names), &joints)?;
+        add(&mut unpacked, &channels, &tensor)?;
     }
-    if joints.is_empty() {
-        let note = "names no joints: the columns of its tensors are taken in the order of the model's joints";
-        unpacked.table.notes.push(note.to_owned());
-    }
+    unpacked.table.notes.extend(channels.note());
     Ok(unpacked.table)
 }
 
-/// The stem of a tensor's columns, if it is the file's for that stem.
-fn stem(name: &str, all: &[String]) -> Option<&'static str> {
-    let (_, stem) = CHANNELS.iter().find(|(known, _)| *known == name)?;
-    let mut of_stem = CHANNELS.iter().filter(|(_, other)| other == stem);
-    let first = of_stem.find(|(known, _)| all.iter().any(|name| name == known))?;
-    (first.0 == name).then_some(stem)
-}
-
-/// The columns of a tensor: of a joint each if it has a stem, as those of an array otherwise.
-fn add(
-    unpacked: &mut Unpacked,
-    tensor: &Tensor,
-    stem: Option<&str>,
-    joints: &[String],
-) -> Result<(), String> {
+/// The columns of a tensor of numbers.
+fn add(unpacked: &mut Unpacked, channels: &Channels, tensor: &Tensor) -> Result<(), String> {
     let (name, shape) = (&tensor.name, tensor.shape());
-    let is_channel = stem.is_some() || name == "time";
-    if !(1..=2).contains(&shape.len()) {
-        return match is_channel {
-            true => Err(format!(
-                "tensor {name:?} has the shape {shape:?}; save one row per sample, and one column per joint"
-            )),
-            false => Ok(()),
-        };
-    }
-    let columns = shape.get(1).copied().unwrap_or(1);
-    if stem.is_some() && !joints.is_empty() && joints.len() != columns {
-        return Err(format!(
-            "tensor {name:?} has {columns} columns, and {} joints have names; save as many of both",
-            joints.len()
-        ));
+    if !channels.takes(name, shape)? {
+        return Ok(());
     }
     unpacked.take(tensor.byte_len() as u64)?;
     let numbers = tensor.read().map_err(|why| damaged(&why))?;
@@ -113,12 +68,7 @@ fn add(
         shape: shape.to_vec(),
         numbers: Cursor::new(numbers),
     };
-    match (stem, joints) {
-        (Some(stem), [_, ..]) => {
-            unpacked.add_as(name, array, |column| format!("{stem}_{}", joints[column]))
-        }
-        _ => unpacked.add(stem.unwrap_or(name), array),
-    }
+    channels.add(unpacked, name, array)
 }
 
 /// The names of the joints; none if the file gives none.
@@ -145,17 +95,15 @@ fn left_out(entries: &HashMap<String, PickleValue>) -> Result<Vec<String>, Strin
         .filter_map(|(name, value)| Some((name, foreign(value)?)))
         .collect();
     found.sort_unstable();
-    let note = |(name, kind): (&String, &str)| {
-        let is_channel = name == "time" || CHANNELS.iter().any(|(known, _)| known == name);
-        match kind.starts_with("numpy.") && !is_channel {
-            true => Ok(format!(
-                "{name:?} is left out: it is not a tensor, but {kind}"
-            )),
-            false => Err(format!(
-                "entry {name:?} holds a pickled object, {kind}, which is never built, since that can run any code; save \
+    let note = |(name, kind): (&String, &str)| match kind.starts_with("numpy.") && !is_channel(name)
+    {
+        true => Ok(format!(
+            "{name:?} is left out: it is not a tensor, but {kind}"
+        )),
+        false => Err(format!(
+            "entry {name:?} holds a pickled object, {kind}, which is never built, since that can run any code; save \
                  tensors, such as torch.as_tensor(values)"
-            )),
-        }
+        )),
     };
     found.into_iter().map(note).collect()
 }
