@@ -22,6 +22,8 @@ use crate::sim::metric::errors_in;
 const PARTS: usize = 2;
 /// Stretches of each part: one that is slow, say, has others beside it.
 const STRETCHES: usize = 4;
+/// Rows of a limb's logs that are compared.
+const ROWS: usize = 3000;
 /// Most steps of a fit that only has to show whether motion says more: it starts near its end.
 const TRIAL: LevenbergMarquardt = at_most(6);
 /// Most steps of an estimate, which starts near its end as well: a limb whose motion leaves it in a long valley keeps what
@@ -92,8 +94,8 @@ impl<'l> Comparison<'l> {
             ..limb.problem(whole, &NOTHING, errors)
         };
         let (motion, torques) = (
-            problem(ErrorModel::OutputError),
-            problem(ErrorModel::InverseDynamics),
+            problem(ErrorModel::OutputError).spread_over(ROWS),
+            problem(ErrorModel::InverseDynamics).spread_over(ROWS),
         );
         let (windows, noise) = (
             torques.shooting.windows.clone(),

@@ -1,8 +1,8 @@
 //! Stage 4: how commands reach the drives of a machine on position control, decided by the motion.
 //!
 //! The torques that a law asks for, low-passed, hardly tell a delay from a lag, and a search that took the wrong one makes up
-//! with friction and rotors for what it leaves. So it is repeated with each of them alone, and the model stays that
-//! predicts the motion under the commands best.
+//! with friction and rotors for what it leaves. So the motion under the commands is asked which of them it fits better, and if
+//! it is another one than was found, the search goes on from there, with that one alone.
 
 use rand::Rng;
 
@@ -14,7 +14,7 @@ use super::problem::Problem;
 use super::searched::Searched;
 use super::stage::Watch;
 use crate::data::{Joint, Log};
-use crate::model::{AlikeOn, FittedEffect};
+use crate::model::{AlikeOn, Effect, FittedEffect, Library, Model};
 
 /// As [`Searched::by`], with the filter of commands that the motion asks for.
 ///
@@ -26,36 +26,69 @@ pub(super) fn searched<'a>(
     rng: &mut impl Rng,
     watch: &dyn Watch,
 ) -> Result<Searched<'a>, StudyError> {
-    let mut best = Searched::by(declared.clone(), apart, rng, watch)?;
-    if !declared.problem.is_by_law() || !is_in_doubt(&best) {
+    let best = Searched::by(declared, apart, rng, watch)?;
+    let Declared { problem, fitted } = best.declared.clone();
+    if !problem.is_by_law() || !is_in_doubt(&best) {
         return Ok(best);
     }
-    let Declared { problem, fitted } = declared;
-    let joints = Joint::all(problem.declared.joints).collect();
-    let limb = Limb::of(&problem, &[], joints);
-    let Some(mut least) = loss_of_motion(&problem, &limb, &best) else {
+    let limb = Limb::of(&problem, &[], Joint::all(problem.declared.joints).collect());
+    let found = &best.chosen.after.model;
+    let enough = loss_of_motion(&problem, &limb, found)
+        .map(|found| found * (1.0 - problem.settings.select.round_gain));
+    let is_enough = |loss: &f64| enough.is_some_and(|enough| *loss < enough);
+    let of_filter = |library: &'a Library| {
+        let filter = library.effects().iter().find(|effect| effect.is_filter())?;
+        let model = filtered_by(filter, &problem, found)?;
+        Some((loss_of_motion(&problem, &limb, &model)?, library, model))
+    };
+    let filters = problem.library.of_one_filter().iter();
+    let likeliest = filters
+        .filter_map(of_filter)
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, library, model)) = likeliest.filter(|(loss, ..)| is_enough(loss)) else {
         return Ok(best);
     };
-    for library in problem.library.of_one_filter() {
-        if watch.has_to_end() {
-            break;
-        }
-        let alone = Declared {
-            problem: Problem {
-                library,
-                ..problem.clone()
-            },
-            fitted: fitted.clone(),
-        };
-        let mut other = Searched::by(alone, apart, rng, watch)?;
-        other.declared.problem.library = problem.library;
-        let enough = least * (1.0 - problem.settings.select.round_gain);
-        let loss = loss_of_motion(&problem, &limb, &other);
-        if let Some(loss) = loss.filter(|loss| *loss < enough) {
-            (best, least) = (other, loss);
+    let alone = Problem {
+        library,
+        ..problem.clone()
+    };
+    let Ok(first) = estimate(&alone, &model) else {
+        return Ok(best);
+    };
+    let alone = Declared {
+        problem: alone,
+        fitted,
+    };
+    let mut other = Searched::from(first, alone, apart, rng, watch);
+    other.declared.problem.library = problem.library;
+    let loss = loss_of_motion(&problem, &limb, &other.chosen.after.model);
+    Ok(match loss.filter(is_enough) {
+        Some(_) => other,
+        None => best,
+    })
+}
+
+/// A model whose commands are filtered in this way only, for as long as they were in all; `None` if they are already.
+fn filtered_by(filter: &Effect, problem: &Problem<'_>, model: &Model) -> Option<Model> {
+    let mut model = model.clone();
+    let added = problem.added(&model);
+    let (filters, others): (Vec<_>, Vec<_>) =
+        (model.effects.split_off(added.start).into_iter()).partition(|own| own.effect.is_filter());
+    if filters.iter().all(|own| own.effect.name == filter.name) {
+        return None;
+    }
+    model.effects.extend(others);
+    for joint in Joint::all(model.joints) {
+        let own = filters.iter().filter(|filter| filter.joint == joint);
+        let times: Vec<f64> = own.map(|filter| filter.values[0].0).collect();
+        if !times.is_empty() {
+            model.effects.push(FittedEffect {
+                values: vec![(times.iter().sum(), None)],
+                ..FittedEffect::absent(filter, joint)
+            });
         }
     }
-    Ok(best)
+    Some(model)
 }
 
 /// Whether commands were found to be filtered, but not as one bus to all drives does.
@@ -72,9 +105,8 @@ fn is_in_doubt(searched: &Searched<'_>) -> bool {
     !filters.is_empty() && !is_of_one_bus
 }
 
-/// The loss of the motion under the commands, after a short fit to it.
-fn loss_of_motion(problem: &Problem<'_>, limb: &Limb, searched: &Searched<'_>) -> Option<f64> {
-    let model = &searched.chosen.after.model;
+/// The loss of the motion under the commands, after a short fit of a model to it.
+fn loss_of_motion(problem: &Problem<'_>, limb: &Limb, model: &Model) -> Option<f64> {
     let trial = Comparison::of(problem, limb).short(model);
     estimate(&trial, model).ok().map(|fitted| fitted.loss())
 }

@@ -23,6 +23,9 @@ use crate::data::{Audit, Joint, Log};
 use crate::identify::{FitError, as_it_stands};
 use crate::model::{FittedEffect, Library, Model, PerLogValue};
 
+/// Rows of a limb's logs that are searched; the whole is fitted to all of them.
+const ROWS: usize = 6000;
+
 /// As [`find`](super::find), limb by limb; `None` if there is only one limb, or motion is compared, in which all joints are one part.
 pub(super) fn find_in_limbs<'a>(
     declared: &Declared<'a>,
@@ -96,6 +99,7 @@ impl Limb {
         watch: &dyn Watch,
     ) -> Result<Part<'l>, StudyError> {
         let problem = self.problem(whole, whole.library, whole.error_model);
+        let problem = problem.spread_over(ROWS);
         Ok(Part {
             joints: self.joints.clone(),
             searched: command_path::searched(problem.fit_declared()?, &self.apart, rng, watch)?,

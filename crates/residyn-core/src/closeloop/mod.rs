@@ -45,6 +45,7 @@ mod select;
 mod settings;
 mod smoothing;
 mod split;
+mod spread;
 mod stage;
 mod start;
 #[cfg(test)]

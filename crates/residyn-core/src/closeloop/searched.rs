@@ -52,10 +52,28 @@ impl<'a> Searched<'a> {
             left = best.diagnose(rng);
         }
         best.left = Some(left);
-        while let Some(plainer) = best.plainer(apart, watch) {
-            best = plainer;
+        Ok(best.plainest(apart, watch))
+    }
+
+    /// The search that begins with a model, and plainer models from there.
+    pub fn from(
+        first: Fitted,
+        declared: Declared<'a>,
+        apart: &[Log],
+        rng: &mut impl Rng,
+        watch: &dyn Watch,
+    ) -> Self {
+        let mut best = Self::beginning_with(Some(first), declared, watch);
+        best.left = Some(best.diagnose(rng));
+        best.plainest(apart, watch)
+    }
+
+    /// Plainer models in place of the chosen one, as long as they predict whole logs better.
+    fn plainest(mut self, apart: &[Log], watch: &dyn Watch) -> Self {
+        while let Some(plainer) = self.plainer(apart, watch) {
+            self = plainer;
         }
-        Ok(best)
+        self
     }
 
     /// Judge each effect, and test the residuals.

@@ -5,6 +5,7 @@
 
 use rand::Rng;
 
+use super::by_motion::estimate;
 use super::command_path;
 use super::error_model::ErrorModel;
 use super::fitted::Fitted;
@@ -35,8 +36,7 @@ impl<'a> Problem<'a> {
         }
         let in_torques = self.in_torques().fit_declared().ok()?;
         let found = command_path::searched(in_torques, apart, rng, watch).ok()?;
-        let start_states = self.shooting.initial_start_states(0);
-        let first = (self.refit(&found.chosen.after.model, start_states, None)).ok()?;
+        let first = estimate(self, &found.chosen.after.model).ok()?;
         (first.loss() < declared.loss()).then_some(first)
     }
 

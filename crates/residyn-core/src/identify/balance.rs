@@ -7,7 +7,7 @@ use super::values::Values;
 use crate::data::{Joint, Log, Measured, Smooth, Smoothing, row_from};
 use crate::expr::{Program, Tape};
 use crate::lanes::Row;
-use crate::model::Dynamics;
+use crate::model::{Dynamics, Filter};
 use crate::sim::{Commands, Mean, Point, Window};
 
 /// A log as the torque error reads it, thinned out.
@@ -34,14 +34,20 @@ impl Rows {
 }
 
 /// What each log gives at its rows, `[log][channel][row]`: the torques that act, then the model's further measured
-/// columns; and the slopes of the torques with respect to the model's filter parameters, `[log][filter][row]`.
+/// columns; and the slopes of the torques with respect to the parameters of some filters, `[log][filter][row]`.
 pub(super) struct Acting {
     given: Vec<Vec<Vec<f64>>>,
     slopes: Vec<Vec<Vec<f64>>>,
 }
 
 impl Acting {
-    pub fn of(dynamics: &Dynamics, values: &Values, logs: &[Log], rows: &[Rows]) -> Self {
+    /// With the slopes of all of the model's filters, or of none.
+    pub fn of(
+        dynamics: &Dynamics,
+        values: &Values,
+        (logs, rows): (&[Log], &[Rows]),
+        slopes_of: &[Filter],
+    ) -> Self {
         let mut acting = Self {
             given: Vec::new(),
             slopes: Vec::new(),
@@ -67,7 +73,7 @@ impl Acting {
             acting
                 .given
                 .push(tau.chain(measured.into_iter().cloned()).collect());
-            let slopes = dynamics.filters.iter().map(|filter| {
+            let slopes = slopes_of.iter().map(|filter| {
                 let means = filtered[filter.joint].as_ref();
                 let means = means.expect("the joint has a filter");
                 rows.smoothing

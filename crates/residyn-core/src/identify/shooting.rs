@@ -9,7 +9,7 @@ use super::prior::Prior;
 use super::sensitivity::{LANES, Local, Tangent};
 use super::values::{Column, Values};
 use crate::data::{Log, half_width_s};
-use crate::model::{Dynamics, Model};
+use crate::model::{Dynamics, Filter, Model};
 use crate::sim::{Commands, FIT_S, Point, Window, cut, initial_state};
 
 /// Least squares over windows of logs.
@@ -264,7 +264,7 @@ impl<'l> Shooting<'l> {
             });
             all
         };
-        let per_pack = self.per_pack(dynamics, values, of_motion, |pack, data| {
+        let per_pack = self.per_pack(dynamics, values, &[], of_motion, |pack, data| {
             pack.residuals(dynamics, values, data)
         });
         let mut out = vec![Vec::new(); self.windows.len()];
@@ -304,6 +304,7 @@ impl<'l> Shooting<'l> {
         let per_pack = self.per_pack(
             dynamics,
             values,
+            &[],
             |pack, commands| pack.costs(dynamics, values, commands, start_states, scale),
             |pack, data| pack.costs(dynamics, values, data, scale),
         );
@@ -315,11 +316,12 @@ impl<'l> Shooting<'l> {
         out
     }
 
-    /// The result of each window, computed for all packs at once.
+    /// The result of each window, computed for all packs at once; with the slopes of the torques by these filters.
     fn per_pack<T: Send>(
         &self,
         dynamics: &Dynamics,
         values: &Values,
+        slopes_of: &[Filter],
         of_motion: impl Fn(&Pack, &[Commands<'_>]) -> Vec<(usize, T)> + Sync,
         of_torques: impl Fn(&Balance, (&[Rows], &Acting)) -> Vec<(usize, T)> + Sync,
     ) -> Vec<(usize, T)> {
@@ -330,7 +332,7 @@ impl<'l> Shooting<'l> {
                 packs.flat_map(|pack| of_motion(pack, &commands)).collect()
             }
             Measure::Torques { rows, packs } => {
-                let acting = Acting::of(dynamics, values, self.logs, rows);
+                let acting = Acting::of(dynamics, values, (self.logs, rows), slopes_of);
                 let packs = packs.par_iter();
                 packs
                     .flat_map(|pack| of_torques(pack, (rows.as_slice(), &acting)))
@@ -360,6 +362,7 @@ impl<'l> Shooting<'l> {
         let mut all = self.per_pack(
             dynamics,
             values,
+            &dynamics.filters,
             |pack, commands| pack.linearise(tangent, values, commands, start_states, scale),
             |pack, data| pack.linearise(tangent, values, data, scale),
         );

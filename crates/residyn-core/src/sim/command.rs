@@ -164,7 +164,7 @@ impl<'l> Commands<'l> {
     /// What the drive of a joint delivers from each row to the next, if it has a filter.
     pub fn delivered(&self, joint: Joint) -> Option<Vec<Mean>> {
         let history = self.histories[joint].as_ref()?;
-        let ends: Vec<Instant> = self.time.iter().map(|time| history.at(*time)).collect();
+        let ends = history.at_rows();
         let means = ends.windows(2).map(|ends| ends[0].mean_until(&ends[1]));
         // The last command is held for ever.
         let last = Mean {
@@ -337,16 +337,37 @@ impl<'l> History<'l> {
         self.after(time - self.time[0])
     }
 
-    /// The instant just before `since` seconds after the first row. Time differences keep the digits that large times
-    /// lose.
+    /// The instant just before each row: a walk, since the commands that act there come in order.
+    fn at_rows(&self) -> Vec<Instant> {
+        let mut next = 0;
+        let rows = (0..self.time.len()).map(|row| {
+            let time = self.since(row) - self.delay;
+            while next < row && self.since(next) < time {
+                next += 1;
+            }
+            self.instant(time, next)
+        });
+        rows.collect()
+    }
+
+    /// The instant just before `since` seconds after the first row.
     fn after(&self, since: f64) -> Instant {
         let time = since - self.delay;
-        let since = |row: usize| self.time[row] - self.time[0];
-        let row = self.time.partition_point(|t| *t - self.time[0] < time);
-        let (output, output_by_lag, command_integral) = match row.checked_sub(1) {
+        let next = self.time.partition_point(|t| *t - self.time[0] < time);
+        self.instant(time, next)
+    }
+
+    /// The time of a row since the first. Time differences keep the digits that large times lose.
+    fn since(&self, row: usize) -> f64 {
+        self.time[row] - self.time[0]
+    }
+
+    /// The instant at which the commands of a time since the first row act, before those of the `next` row.
+    fn instant(&self, time: f64, next: usize) -> Instant {
+        let (output, output_by_lag, command_integral) = match next.checked_sub(1) {
             None => (self.command[0], 0.0, self.command[0] * time),
             Some(row) => {
-                let span = time - since(row);
+                let span = time - self.since(row);
                 let (output, output_by_lag) = self.within(row, span);
                 let integral = self.integral[row] + self.command[row] * span;
                 (output, output_by_lag, integral)
