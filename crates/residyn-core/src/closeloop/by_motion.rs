@@ -22,8 +22,10 @@ use crate::sim::metric::errors_in;
 const PARTS: usize = 2;
 /// Stretches of each part: one that is slow, say, has others beside it.
 const STRETCHES: usize = 4;
-/// Rows of a limb's logs that are compared.
-const ROWS: usize = 3000;
+/// Rows of a limb's logs that an estimate is made from.
+const ESTIMATED: usize = 6000;
+/// Rows of a limb's logs that only have to show which of two fits is better.
+const COMPARED: usize = 3000;
 /// Most steps of a fit that only has to show whether motion says more: it starts near its end.
 const TRIAL: LevenbergMarquardt = at_most(6);
 /// Most steps of an estimate, which starts near its end as well: a limb whose motion leaves it in a long valley keeps what
@@ -80,6 +82,8 @@ pub(super) fn by_limbs(problem: &Problem<'_>, model: &Model) -> Vec<Limb> {
 /// A limb's logs, compared by motion and by the torques that the law of its drives asks for.
 pub(super) struct Comparison<'l> {
     motion: Problem<'l>,
+    /// A part of the motion.
+    compared: Problem<'l>,
     /// The same with friction that reverses as slowly as in the torques, so that steps may be longer.
     trial: Problem<'l>,
     torques: Problem<'l>,
@@ -94,9 +98,10 @@ impl<'l> Comparison<'l> {
             ..limb.problem(whole, &NOTHING, errors)
         };
         let (motion, torques) = (
-            problem(ErrorModel::OutputError).spread_over(ROWS),
-            problem(ErrorModel::InverseDynamics).spread_over(ROWS),
+            problem(ErrorModel::OutputError).spread_over(ESTIMATED),
+            problem(ErrorModel::InverseDynamics).spread_over(COMPARED),
         );
+        let compared = motion.spread_over(COMPARED);
         let (windows, noise) = (
             torques.shooting.windows.clone(),
             of_joints(&whole.shooting.noise, limb.joints()),
@@ -107,11 +112,12 @@ impl<'l> Comparison<'l> {
         Self {
             trial: Problem {
                 solver: &TRIAL,
-                ..motion.with_smoothing_velocities(widths.clone())
+                ..compared.with_smoothing_velocities(widths.clone())
             },
             torques: torques
                 .with_smoothing_velocities(widths)
                 .over(shooting.near(torques.declared)),
+            compared,
             motion,
         }
     }
@@ -125,7 +131,7 @@ impl<'l> Comparison<'l> {
     pub fn short(&self, model: &Model) -> Problem<'l> {
         Problem {
             solver: &TRIAL,
-            ..stable(&self.motion, model)
+            ..stable(&self.compared, model)
         }
     }
 

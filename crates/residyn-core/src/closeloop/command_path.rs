@@ -70,25 +70,27 @@ pub(super) fn searched<'a>(
 
 /// A model whose commands are filtered in this way only, for as long as they were in all; `None` if they are already.
 fn filtered_by(filter: &Effect, problem: &Problem<'_>, model: &Model) -> Option<Model> {
-    let mut model = model.clone();
-    let added = problem.added(&model);
-    let (filters, others): (Vec<_>, Vec<_>) =
-        (model.effects.split_off(added.start).into_iter()).partition(|own| own.effect.is_filter());
+    let (declared, added) = model.effects.split_at(problem.added(model).start);
+    let filters = added.iter().filter(|own| own.effect.is_filter());
+    let filters: Vec<&FittedEffect> = filters.collect();
     if filters.iter().all(|own| own.effect.name == filter.name) {
         return None;
     }
-    model.effects.extend(others);
-    for joint in Joint::all(model.joints) {
-        let own = filters.iter().filter(|filter| filter.joint == joint);
-        let times: Vec<f64> = own.map(|filter| filter.values[0].0).collect();
-        if !times.is_empty() {
-            model.effects.push(FittedEffect {
-                values: vec![(times.iter().sum(), None)],
-                ..FittedEffect::absent(filter, joint)
-            });
-        }
-    }
-    Some(model)
+    let of_joint = |joint| filters.iter().filter(move |own| own.joint == joint);
+    let instead = |own: &FittedEffect| FittedEffect {
+        values: vec![(of_joint(own.joint).map(|own| own.values[0].0).sum(), None)],
+        ..FittedEffect::absent(filter, own.joint)
+    };
+    let is_first = |own: &FittedEffect| {
+        of_joint(own.joint)
+            .next()
+            .is_some_and(|first| std::ptr::eq(*first, own))
+    };
+    let added = added.iter().filter_map(|own| match own.effect.is_filter() {
+        true => is_first(own).then(|| instead(own)),
+        false => Some(own.clone()),
+    });
+    Some(model.with_effects(declared.iter().cloned().chain(added).collect()))
 }
 
 /// Whether commands were found to be filtered, but not as one bus to all drives does.
