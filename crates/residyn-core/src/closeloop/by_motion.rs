@@ -24,7 +24,7 @@ const PARTS: usize = 2;
 const STRETCHES: usize = 4;
 /// Rows of a limb's logs that an estimate is made from.
 const ESTIMATED: usize = 6000;
-/// Rows of a limb's logs that only have to show which of two fits is better.
+/// Rows of a limb's logs that only have to show which of two effects they ask for.
 const COMPARED: usize = 3000;
 /// Most steps of a fit that only has to show whether motion says more: it starts near its end.
 const TRIAL: LevenbergMarquardt = at_most(6);
@@ -82,8 +82,6 @@ pub(super) fn by_limbs(problem: &Problem<'_>, model: &Model) -> Vec<Limb> {
 /// A limb's logs, compared by motion and by the torques that the law of its drives asks for.
 pub(super) struct Comparison<'l> {
     motion: Problem<'l>,
-    /// A part of the motion.
-    compared: Problem<'l>,
     /// The same with friction that reverses as slowly as in the torques, so that steps may be longer.
     trial: Problem<'l>,
     torques: Problem<'l>,
@@ -99,9 +97,8 @@ impl<'l> Comparison<'l> {
         };
         let (motion, torques) = (
             problem(ErrorModel::OutputError).spread_over(ESTIMATED),
-            problem(ErrorModel::InverseDynamics).spread_over(COMPARED),
+            problem(ErrorModel::InverseDynamics).spread_over(ESTIMATED),
         );
-        let compared = motion.spread_over(COMPARED);
         let (windows, noise) = (
             torques.shooting.windows.clone(),
             of_joints(&whole.shooting.noise, limb.joints()),
@@ -112,12 +109,11 @@ impl<'l> Comparison<'l> {
         Self {
             trial: Problem {
                 solver: &TRIAL,
-                ..compared.with_smoothing_velocities(widths.clone())
+                ..motion.with_smoothing_velocities(widths.clone())
             },
             torques: torques
                 .with_smoothing_velocities(widths)
                 .over(shooting.near(torques.declared)),
-            compared,
             motion,
         }
     }
@@ -127,11 +123,11 @@ impl<'l> Comparison<'l> {
         stable(&self.motion, model).refined()
     }
 
-    /// The motion, for fits that end after a few steps.
+    /// A part of the motion, for fits that end after a few steps.
     pub fn short(&self, model: &Model) -> Problem<'l> {
         Problem {
             solver: &TRIAL,
-            ..stable(&self.compared, model)
+            ..stable(&self.motion.spread_over(COMPARED), model)
         }
     }
 
