@@ -420,7 +420,7 @@ fn a_search_that_begins_over_short_windows_ends_with_the_same_effects() {
 #[test]
 fn windows_with_dropped_rows_do_not_count_as_unexplained() {
     const ROUGH: &str = r#"
-excitation = { amplitude = [1.6], band_hz = [0.15, 15.0], tones = 30 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 30.0], tones = 30 }
 recording = { logs = 3, duration_s = 8, start = [0, 0] }
 "#;
     let with_dropped = |mut log: Log| {
@@ -443,11 +443,7 @@ recording = { logs = 3, duration_s = 8, start = [0, 0] }
         assert_eq!(log.filled.len(), 25);
         log.masked = vec![std::mem::take(&mut log.filled)];
     }
-    let counted = found(&study);
-    assert!(
-        counted.omnibus.windows > left.omnibus.windows,
-        "{counted:?}"
-    );
+    assert!(found(&study).is_significant(), "were they counted");
 }
 
 /// An inertia a fifth of the rig's and a moment five times as large make the mass matrix indefinite.
