@@ -27,15 +27,24 @@ pub(super) fn searched<'a>(
     watch: &dyn Watch,
 ) -> Result<Searched<'a>, StudyError> {
     let best = Searched::by(declared, apart, rng, watch)?;
-    let Declared { problem, fitted } = best.declared.clone();
-    if !problem.is_by_law() || !is_in_doubt(&best) {
+    if !best.declared.problem.is_by_law() || !is_in_doubt(&best) {
         return Ok(best);
     }
+    Ok(searched_on(&best, apart, rng, watch).unwrap_or(best))
+}
+
+/// What the search finds from there with the one filter that the motion asks for; `None` if the motion is fitted no better.
+fn searched_on<'a>(
+    best: &Searched<'a>,
+    apart: &[Log],
+    rng: &mut impl Rng,
+    watch: &dyn Watch,
+) -> Option<Searched<'a>> {
+    let Declared { problem, fitted } = best.declared.clone();
     let limb = Limb::of(&problem, &[], Joint::all(problem.declared.joints).collect());
     let found = &best.chosen.after.model;
-    let enough = loss_of_motion(&problem, &limb, found)
-        .map(|found| found * (1.0 - problem.settings.select.round_gain));
-    let is_enough = |loss: &f64| enough.is_some_and(|enough| *loss < enough);
+    let enough =
+        loss_of_motion(&problem, &limb, found)? * (1.0 - problem.settings.select.round_gain);
     let of_filter = |library: &'a Library| {
         let filter = library.effects().iter().find(|effect| effect.is_filter())?;
         let model = filtered_by(filter, &problem, found)?;
@@ -45,27 +54,20 @@ pub(super) fn searched<'a>(
     let likeliest = filters
         .filter_map(of_filter)
         .min_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((_, library, model)) = likeliest.filter(|(loss, ..)| is_enough(loss)) else {
-        return Ok(best);
-    };
+    let (_, library, model) = likeliest.filter(|(loss, ..)| *loss < enough)?;
     let alone = Problem {
         library,
         ..problem.clone()
     };
-    let Ok(first) = estimate(&alone, &model) else {
-        return Ok(best);
-    };
+    let first = estimate(&alone, &model).ok()?;
     let alone = Declared {
         problem: alone,
         fitted,
     };
     let mut other = Searched::from(first, alone, apart, rng, watch);
     other.declared.problem.library = problem.library;
-    let loss = loss_of_motion(&problem, &limb, &other.chosen.after.model);
-    Ok(match loss.filter(is_enough) {
-        Some(_) => other,
-        None => best,
-    })
+    let loss = loss_of_motion(&problem, &limb, &other.chosen.after.model)?;
+    (loss < enough).then_some(other)
 }
 
 /// A model whose commands are filtered in this way only, for as long as they were in all; `None` if they are already.
