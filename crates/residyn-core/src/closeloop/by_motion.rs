@@ -123,10 +123,13 @@ impl<'l> Comparison<'l> {
         stable(&self.motion, model).refined()
     }
 
-    /// A part of the motion, for fits that end after a few steps.
+    /// A part of the motion, for fits that end after a few steps. Bodies stay: with them free, most of the time would go into
+    /// what all models that are compared have in common.
     pub fn short(&self, model: &Model) -> Problem<'l> {
+        let bodies = model.inertias().into_iter().flatten();
         Problem {
             solver: &TRIAL,
+            held: self.motion.held.iter().copied().chain(bodies).collect(),
             ..stable(&self.motion.spread_over(COMPARED), model)
         }
     }

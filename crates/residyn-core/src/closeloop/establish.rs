@@ -6,12 +6,12 @@ use super::fitted::Fitted;
 use super::plainer::Unused;
 use super::problem::Problem;
 use super::select::{
-    Folds, Losses, Rival, Round, Selected, Trial, candidates, gain, p_of_gains, p_value, rivals,
+    Folds, Losses, Rival, Round, Selected, Trial, candidates, gain, p_of_gains, p_value_by, rivals,
     starts,
 };
 use super::settings::EstablishSettings;
 use super::stage::{Stage, Watch};
-use crate::identify::FitError;
+use crate::identify::{FitError, uncertainty};
 use crate::model::{FittedEffect, Status};
 
 /// How sure an effect of the model is.
@@ -145,6 +145,7 @@ pub(super) fn standings(
     let halves = Folds::of(problem).in_halves();
     let crossed = |trial: &Trial| Losses::by(problem, &halves, &trial.fitted);
     let with = crossed(chosen);
+    let known = uncertainty(&problem.shooting, &chosen.fitted.fit);
     let added = problem.added(&chosen.fitted.model);
     let standing = |(k, less): (usize, &Result<Trial, FitError>)| {
         let effect = chosen.fitted.model.effects[k].clone();
@@ -156,7 +157,7 @@ pub(super) fn standings(
         let (crossed_less, with) = (of_joint(&crossed(less)), of_joint(&with));
         let evidence = Evidence {
             gain: gain(&of_joint(&less.losses), &of_joint(&chosen.losses)),
-            p_of_values: p_value(problem, &chosen.fitted, k),
+            p_of_values: p_value_by(&known, problem, &chosen.fitted, k),
             p_of_falls: p_of_gains(&crossed_less, &with),
             crossed_gain: gain(&crossed_less, &with),
         };

@@ -189,7 +189,7 @@ impl Chosen {
             refined.problem.settings.establish.uncorrected_false_alarm,
         );
         let added = problem.added(&refined.after.model);
-        let reason = |k: usize| match p_value(problem, &refined.after, k) {
+        let reason = |k: usize| match refined.p_value(k) {
             Some(p) if p > least => Some(format!(
                 "in finer steps its value is not significant (p = {p:.2})"
             )),

@@ -6,6 +6,7 @@ use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::judge::Found;
 use super::problem::Problem;
+use super::select::p_value_by;
 use super::stage::{Stage, Watch};
 use crate::data::Joint;
 use crate::identify::{
@@ -81,6 +82,13 @@ pub(super) fn refined<'a>(
         identifiability,
         failure,
         by_motion: Vec::new(),
+    }
+}
+
+impl Refined<'_> {
+    /// Probability of the values of the k-th effect of the chosen model if it were absent, see [`p_value_by`].
+    pub(super) fn p_value(&self, k: usize) -> Option<f64> {
+        p_value_by(&self.uncertainty, &self.problem, &self.after, k)
     }
 }
 

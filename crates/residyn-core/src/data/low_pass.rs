@@ -19,6 +19,11 @@ struct Section {
 
 /// Number of values added beyond either end.
 const BEYOND: usize = 15;
+/// Channels that are filtered side by side: each value of one waits for the value before it.
+const ABREAST: usize = 8;
+
+/// Values of channels side by side.
+type Abreast<const W: usize> = [f64; W];
 
 impl LowPass {
     /// A filter whose cutoff is this share of the sampling rate, below a half.
@@ -41,34 +46,83 @@ impl LowPass {
 
     /// The channel after both passes; of equal length.
     pub fn apply(&self, channel: &[f64]) -> Vec<f64> {
-        let beyond = BEYOND.min(channel.len().saturating_sub(1));
-        let (Some(first), Some(last)) = (channel.first(), channel.last()) else {
-            return Vec::new();
+        self.abreast::<1>(&[channel]).swap_remove(0)
+    }
+
+    /// The same for channels of equal length.
+    pub fn apply_to_all(&self, channels: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
+        let several = channels.chunks(ABREAST);
+        several
+            .flat_map(|some| self.abreast::<ABREAST>(some))
+            .collect()
+    }
+
+    /// The same for at most `W` channels, and at least one.
+    fn abreast<const W: usize>(&self, channels: &[&[f64]]) -> Vec<Vec<f64>> {
+        let length = channels[0].len();
+        let Some(last) = length.checked_sub(1) else {
+            return vec![Vec::new(); channels.len()];
         };
-        let before = channel[1..=beyond].iter().rev().map(|x| 2.0 * first - x);
-        let after = channel.iter().rev().skip(1).take(beyond);
-        let after = after.map(|x| 2.0 * last - x);
-        let mut all: Vec<f64> = before.chain(channel.iter().copied()).chain(after).collect();
-        for _ in 0..2 {
-            for section in &self.sections {
-                section.run(&mut all);
+        let at = |row: usize| -> Abreast<W> {
+            std::array::from_fn(|lane| channels[lane.min(channels.len() - 1)][row])
+        };
+        let reflected = |about: usize, row: usize| -> Abreast<W> {
+            let (about, at) = (at(about), at(row));
+            std::array::from_fn(|lane| 2.0 * about[lane] - at[lane])
+        };
+        let beyond = BEYOND.min(last);
+        let before = (1..=beyond).rev().map(|row| reflected(0, row));
+        let after = (1..=beyond).map(|row| reflected(last, last - row));
+        let inside = (0..length).map(at);
+        let mut rows: Vec<Abreast<W>> = before.chain(inside).chain(after).collect();
+        self.pass(rows.iter_mut());
+        self.pass(rows.iter_mut().rev());
+        let of_lane = |lane: usize| {
+            rows[beyond..=beyond + last]
+                .iter()
+                .map(|row| row[lane])
+                .collect()
+        };
+        (0..channels.len()).map(of_lane).collect()
+    }
+
+    /// One pass, in place, from the steady state at the first value.
+    fn pass<'r, const W: usize>(&self, mut rows: impl Iterator<Item = &'r mut Abreast<W>>) {
+        let Some(first) = rows.next() else { return };
+        let mut states = self.sections.map(|section| {
+            let mut state = section.steady(first);
+            section.step(&mut state, first);
+            state
+        });
+        for row in rows {
+            for (section, state) in self.sections.iter().zip(&mut states) {
+                section.step(state, row);
             }
-            all.reverse();
         }
-        all[beyond..beyond + channel.len()].to_vec()
     }
 }
 
+/// What a section keeps of earlier values.
+type State<const W: usize> = [Abreast<W>; 2];
+
 impl Section {
-    /// In place, from the steady state at the first value.
-    fn run(&self, channel: &mut [f64]) {
-        let Self { b0, a1, a2 } = *self;
-        let first = channel.first().copied().unwrap_or(0.0);
-        let (mut z1, mut z2) = (first * (1.0 - b0), first * (b0 - a2));
-        for x in channel {
-            let y = b0 * *x + z1;
-            (z1, z2) = (2.0 * b0 * *x - a1 * y + z2, b0 * *x - a2 * y);
-            *x = y;
+    /// The state after the same values for ever.
+    fn steady<const W: usize>(&self, values: &Abreast<W>) -> State<W> {
+        [
+            values.map(|value| value * (1.0 - self.b0)),
+            values.map(|value| value * (self.b0 - self.a2)),
+        ]
+    }
+
+    /// Replace values by those that the section gives.
+    #[inline(always)]
+    fn step<const W: usize>(&self, [z1, z2]: &mut State<W>, values: &mut Abreast<W>) {
+        for lane in 0..W {
+            let (x, y) = (values[lane], self.b0 * values[lane] + z1[lane]);
+            z1[lane] = 2.0 * self.b0 * x - self.a1 * y + z2[lane];
+            z2[lane] = self.b0 * x - self.a2 * y;
+            values[lane] = y;
         }
     }
 }
@@ -100,5 +154,25 @@ mod tests {
         for (passed, x) in passed.iter().zip(&line).take(70).skip(30) {
             assert!((passed - x).abs() < 1e-3);
         }
+    }
+
+    #[test]
+    fn channels_side_by_side_pass_as_each_does_alone() {
+        let channel = |k: usize| -> Vec<f64> {
+            (0..60)
+                .map(|row| ((k + 1) as f64 * row as f64).sin())
+                .collect()
+        };
+        let channels: Vec<Vec<f64>> = (0..11).map(channel).collect();
+        let filter = LowPass::new(0.1);
+        let alone: Vec<Vec<f64>> = channels
+            .iter()
+            .map(|channel| filter.apply(channel))
+            .collect();
+        assert_eq!(filter.apply_to_all(&channels), alone);
+        assert_eq!(
+            filter.apply_to_all(&vec![Vec::new(); 2]),
+            vec![Vec::<f64>::new(); 2]
+        );
     }
 }

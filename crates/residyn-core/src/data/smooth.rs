@@ -1,7 +1,9 @@
 //! The motion of a log as the torque error uses it: resampled at even steps, low-pass filtered, differentiated.
 
+use std::ops::{Range, RangeInclusive};
+
 use super::direction::{directions, directions_over_steps};
-use super::instant::{ROUNDING, SAME_S};
+use super::instant::{ROUNDING, SAME_S, row_after, row_from};
 use super::log::Log;
 use super::low_pass::LowPass;
 use super::measured::Measured;
@@ -15,6 +17,8 @@ const CUTOFF_HZ: f64 = 10.0;
 const HIGHEST: f64 = 0.2;
 /// Time between rows that are fitted, s: a fifth of the period at the cutoff.
 const ROWS_S: f64 = 0.02;
+/// Beyond this many periods of the cutoff, the filter knows nothing of a value: 1e-10 of it is left.
+const SETTLED: f64 = 10.0;
 /// Time at either end of a log that is not used: the filter knows nothing beyond the ends, s.
 const ENDS_S: f64 = 0.5;
 
@@ -115,6 +119,11 @@ impl Smoothing {
         Self::at(log, places, &FOURTH_ORDER)
     }
 
+    /// Whether the rows of a log are near enough for the cutoff of torques, which is lower for rows farther apart.
+    pub fn passes_full_band(log: &Log) -> bool {
+        CUTOFF_HZ * (log.median_step() - SAME_S) <= HIGHEST / 2.0
+    }
+
     fn at(log: &Log, places: Places, stencils: &'static Stencils) -> Self {
         let step_s = log.median_step();
         let cutoff = (CUTOFF_HZ * step_s).min(HIGHEST / 2.0);
@@ -148,9 +157,55 @@ impl Smoothing {
         }
     }
 
+    /// All of the log.
+    pub fn whole(&self) -> Stretch {
+        Stretch {
+            logged: 0..self.logged.len(),
+            even: 0..self.even.len(),
+            used: 0..self.used.len(),
+        }
+    }
+
+    /// What the used rows between two rows of the log depend on, if commands act for `memory_s` (s).
+    pub fn stretch(&self, rows: &RangeInclusive<usize>, memory_s: f64) -> Stretch {
+        let [from, to] = [rows.start(), rows.end()].map(|row| self.logged[*row]);
+        let within =
+            |times: &[f64], from: f64, to: f64| row_from(times, from)..row_after(times, to);
+        let is_before = |row: &usize, time: f64| self.even[*row] < time - SAME_S;
+        let settled_s = SETTLED / (self.cutoff / self.step_s);
+        let even = within(&self.even, from - settled_s, to + settled_s);
+        let logged = within(&self.logged, from - settled_s - memory_s, to + settled_s);
+        Stretch {
+            // The even times lie between these rows.
+            logged: logged.start.saturating_sub(2)..(logged.end + 2).min(self.logged.len()),
+            used: self.used.partition_point(|row| is_before(row, from))
+                ..self.used.partition_point(|row| is_before(row, to)),
+            even,
+        }
+    }
+
     /// Values that are held from each row of the log to the next, at the rows that are used.
     pub fn held(&self, values: &[f64]) -> Vec<f64> {
         self.used_of(&self.filtered(&self.middle, values))
+    }
+
+    /// The same for several channels over a stretch of the log; zero at rows outside it.
+    pub fn held_in(&self, stretch: &Stretch, channels: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let Stretch { logged, even, used } = stretch;
+        let at_even = |values: &Vec<f64>| {
+            let (even, middle) = (&self.even[even.clone()], &self.middle[logged.clone()]);
+            resampled(even.iter().copied(), middle, values).collect()
+        };
+        let read: Vec<Vec<f64>> = channels.iter().map(at_even).collect();
+        let passed = self.filter.apply_to_all(&read).into_iter();
+        let at_used = |passed: Vec<f64>| {
+            let mut all = vec![0.0; self.used.len()];
+            for row in used.clone() {
+                all[row] = passed[self.used[row] - even.start];
+            }
+            all
+        };
+        passed.map(at_used).collect()
     }
 
     /// The torques of a joint at the rows that are used, each taken at the time at which it acted.
@@ -161,18 +216,40 @@ impl Smoothing {
         }
     }
 
-    /// The torques of a joint whose drive delivers these means from row to row, in the same way.
-    pub fn delivered(&self, log: &Log, joint: usize, means: &[f64]) -> Vec<f64> {
-        if log.torque != TorqueColumn::Sampled {
-            return self.held(means);
-        }
-        // The readings are finer than means between them, and equal where nothing is delayed.
-        let commanded = log.held_torques(joint);
-        let added: Vec<f64> = (means.iter().zip(&*commanded))
-            .map(|(d, c)| d - c)
-            .collect();
-        let both = self.torques(log, joint).into_iter().zip(self.held(&added));
-        both.map(|(tau, added)| tau + added).collect()
+    /// The `logged` torques of all joints at the rows that are used; where a drive delivers other `means` from row to row
+    /// over a stretch of the log, these in the same way.
+    pub fn delivered(
+        &self,
+        log: &Log,
+        stretch: &Stretch,
+        (logged, means): (&[Vec<f64>], &[Option<Vec<f64>>]),
+    ) -> Vec<Vec<f64>> {
+        // Readings are finer than means between them, and equal where nothing is delayed.
+        let is_added = log.torque == TorqueColumn::Sampled;
+        let channel = |(joint, means): (usize, &Option<Vec<f64>>)| {
+            let means = means.as_ref()?.iter();
+            let commanded = log.held_torques(joint);
+            let added = || means.clone().zip(&commanded[stretch.logged.clone()]);
+            Some(match is_added {
+                true => added().map(|(mean, commanded)| mean - commanded).collect(),
+                false => means.copied().collect(),
+            })
+        };
+        let channels: Vec<Vec<f64>> = means.iter().enumerate().filter_map(channel).collect();
+        let mut filtered = self.held_in(stretch, &channels).into_iter();
+        let of_joint = |(tau, means): (&Vec<f64>, &Option<Vec<f64>>)| match means
+            .as_ref()
+            .and_then(|_| filtered.next())
+        {
+            Some(added) if is_added => tau
+                .iter()
+                .zip(&added)
+                .map(|(tau, added)| tau + added)
+                .collect(),
+            Some(delivered) => delivered,
+            None => tau.clone(),
+        };
+        logged.iter().zip(means).map(of_joint).collect()
     }
 
     /// A channel with values at these times, filtered, at all even times.
@@ -195,6 +272,14 @@ impl Smoothing {
     fn used_of<T: Copy>(&self, all: &[T]) -> Vec<T> {
         self.used.iter().map(|row| all[*row]).collect()
     }
+}
+
+/// A part of a log that is smoothed by itself: its rows, the even times, and the rows that are used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretch {
+    pub logged: Range<usize>,
+    even: Range<usize>,
+    used: Range<usize>,
 }
 
 impl Smooth {

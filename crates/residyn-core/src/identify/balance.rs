@@ -1,5 +1,7 @@
 //! The torques that logged motions need, compared with those that act: windows of smoothed logs, one per lane.
 
+use std::ops::RangeInclusive;
+
 use super::normal_equations::{Reduced, WindowTerms};
 use super::sensitivity::{LANES, Tangent};
 use super::sums::{Sums, loss};
@@ -40,48 +42,67 @@ pub(super) struct Acting {
     slopes: Vec<Vec<Vec<f64>>>,
 }
 
+/// Time constants after which a lag has forgotten a command.
+const FORGOTTEN: f64 = 30.0;
+
 impl Acting {
-    /// With the slopes of all of the model's filters, or of none.
+    /// With the slopes of all of the model's filters, or of none. Logs of which no window is used give nothing, and rows
+    /// outside the windows of a log do not matter.
     pub fn of(
         dynamics: &Dynamics,
         values: &Values,
-        (logs, rows): (&[Log], &[Rows]),
+        (logs, rows, windows): (&[Log], &[Rows], &[Window]),
         slopes_of: &[Filter],
     ) -> Self {
-        let mut acting = Self {
-            given: Vec::new(),
-            slopes: Vec::new(),
+        let of_log = |(index, (log, rows)): (usize, (&Log, &Rows))| {
+            let own = windows.iter().filter(|window| window.log == index);
+            let first = own.clone().map(|window| window.first).min();
+            let last = own.map(|window| window.last).max();
+            first
+                .zip(last)
+                .map_or_else(Default::default, |(first, last)| {
+                    let point = Point::new(dynamics, values.of_log(index));
+                    rows.acting(&point, (log, first..=last), slopes_of)
+                })
         };
-        for (index, (log, rows)) in logs.iter().zip(rows).enumerate() {
-            let own = values.of_log(index);
-            let commands = Commands::of_log(Point::new(dynamics, &own), log);
-            let each = |means: &[Mean], of: &dyn Fn(&Mean) -> f64| -> Vec<f64> {
-                means.iter().map(of).collect()
-            };
-            let filtered: Vec<Option<Vec<Mean>>> = Joint::all(dynamics.joints)
-                .map(|joint| commands.delivered(joint))
-                .collect();
-            let smoothed = (rows.smooth.tau.iter()).zip(&filtered).enumerate();
-            let tau = smoothed.map(|(joint, (tau, filtered))| match filtered {
-                Some(means) => {
-                    let means = each(means, &|mean| mean.value);
-                    rows.smoothing.delivered(log, joint, &means)
-                }
-                None => tau.clone(),
-            });
-            let measured = Measured::named(&rows.smooth.measured, dynamics.measured_names());
-            acting
-                .given
-                .push(tau.chain(measured.into_iter().cloned()).collect());
-            let slopes = slopes_of.iter().map(|filter| {
-                let means = filtered[filter.joint].as_ref();
-                let means = means.expect("the joint has a filter");
-                rows.smoothing
-                    .held(&each(means, &|mean| mean.slope(filter.kind)))
-            });
-            acting.slopes.push(slopes.collect());
-        }
-        acting
+        let all = logs.iter().zip(rows).enumerate().map(of_log);
+        let (given, slopes) = all.unzip();
+        Self { given, slopes }
+    }
+}
+
+impl Rows {
+    /// What acts between two rows of the log, and its slopes by some filters, `[channel][row]` each.
+    fn acting(
+        &self,
+        point: &Point<'_>,
+        (log, within): (&Log, RangeInclusive<usize>),
+        slopes_of: &[Filter],
+    ) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+        let (smoothing, dynamics) = (&self.smoothing, point.dynamics);
+        let constants = dynamics
+            .filters
+            .iter()
+            .map(|filter| point.values()[filter.parameter]);
+        let memory_s = FORGOTTEN * constants.fold(0.0, f64::max);
+        let stretch = smoothing.stretch(&within, memory_s);
+        let commands = Commands::of_rows(point, log, stretch.logged.clone());
+        let filtered: Vec<Option<Vec<Mean>>> = Joint::all(dynamics.joints)
+            .map(|joint| commands.delivered(joint))
+            .collect();
+        let each = |means: &Vec<Mean>, of: &dyn Fn(&Mean) -> f64| means.iter().map(of).collect();
+        let values = |means: &Option<Vec<Mean>>| Some(each(means.as_ref()?, &|mean| mean.value));
+        let means: Vec<Option<Vec<f64>>> = filtered.iter().map(values).collect();
+        let tau = smoothing.delivered(log, &stretch, (&self.smooth.tau, &means));
+        let measured = Measured::named(&self.smooth.measured, dynamics.measured_names());
+        let slopes = slopes_of.iter().map(|filter| {
+            let means = filtered[filter.joint].as_ref();
+            let means = means.expect("the joint has a filter");
+            each(means, &|mean| mean.slope(filter.kind))
+        });
+        let slopes: Vec<Vec<f64>> = slopes.collect();
+        let given = tau.into_iter().chain(measured.into_iter().cloned());
+        (given.collect(), smoothing.held_in(&stretch, &slopes))
     }
 }
 

@@ -73,7 +73,7 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         alone.iter().for_each(|&i| part.gradient[i] = 0.0);
     }
     let (model, flat) = inverse(&all);
-    let step = |part: &WindowTerms| inverse(&(&all - &part.hessian)).0 * &part.gradient;
+    let step = |part: &WindowTerms| solution(&(&all - &part.hessian), &part.gradient);
     let steps: Vec<DVector<f64>> = parts.iter().map(step).collect();
     let share = 1.0 / count.max(1) as f64;
     let mean = (steps.iter()).fold(DVector::zeros(size), |sum, step| sum + step) * share;
@@ -122,6 +122,21 @@ fn blocks_of(fit: &Fit, blocks: &[usize]) -> Vec<usize> {
 
 /// Directions with less than this share of the largest eigenvalue are flat: their information is rounding error.
 const FLAT: f64 = 1e-9;
+
+/// The values that belong to a gradient, by their information.
+fn solution(hessian: &DMatrix<f64>, gradient: &DVector<f64>) -> DVector<f64> {
+    let (scaled, scale) = with_unit_diagonal(hessian);
+    let factor = scaled.cholesky().filter(|factor| {
+        let pivots = factor.l_dirty().diagonal();
+        pivots.min().powi(2) > FLAT * pivots.max().powi(2)
+    });
+    match factor {
+        Some(factor) => factor
+            .solve(&gradient.component_mul(&scale))
+            .component_mul(&scale),
+        None => inverse(hessian).0 * gradient,
+    }
+}
 
 /// The inverse of an information matrix, and its part along flat directions. The jackknife, a product of two roundings
 /// there, would understate the variance along them.

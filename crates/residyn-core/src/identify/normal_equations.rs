@@ -1,6 +1,7 @@
 //! Normal equations of windows. A window's own values (its start state, and forces if they are free) do not enter other
 //! windows, so they are eliminated by the Schur complement before windows are summed.
 
+use std::borrow::Cow;
 use std::ops::AddAssign;
 
 use nalgebra::{DMatrix, DVector};
@@ -58,8 +59,8 @@ impl Reduced {
             columns: columns.to_vec(),
             terms: WindowTerms {
                 cost: terms.cost,
-                gradient: part.gradient,
-                hessian: part.matrix,
+                gradient: part.gradient.into_owned(),
+                hessian: part.matrix.into_owned(),
             },
         }
     }
@@ -79,7 +80,7 @@ impl Reduced {
 
 /// The normal equations of all windows in the free values of a fit.
 pub(super) struct Normal {
-    pub windows: Vec<Eliminated>,
+    pub windows: Vec<OwnValues>,
     pub matrix: DMatrix<f64>,
     pub gradient: DVector<f64>,
 }
@@ -104,32 +105,48 @@ impl Normal {
             let part = Eliminated::new(terms, shared, damping);
             scatter_matrix(&part.matrix, &mut normal.matrix, layout.places(window));
             scatter(&part.gradient, &mut normal.gradient, layout.places(window));
-            normal.windows.push(part);
+            normal.windows.push(part.own);
         }
         normal
     }
 
     /// By how much a step of the free values lowers the quadratic model of the cost, the windows' own values following.
     pub fn predicted_decrease(&self, step: &DVector<f64>) -> f64 {
-        let own: f64 = self.windows.iter().map(|window| window.own_decrease).sum();
+        let own: f64 = self.windows.iter().map(|own| own.decrease).sum();
         -self.gradient.dot(step) - 0.5 * step.dot(&(&self.matrix * step)) + own
     }
 }
 
 /// One window's normal equations with its own values eliminated.
-pub(super) struct Eliminated {
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
-    /// Step of the own values = -(own^-1 gradient) - (own^-1 cross) step of the shared ones.
-    local_gradient: DVector<f64>,
-    local_cross: DMatrix<f64>,
-    /// Predicted decrease of the cost if only the own values take a step.
-    own_decrease: f64,
+struct Eliminated<'t> {
+    matrix: Cow<'t, DMatrix<f64>>,
+    gradient: Cow<'t, DVector<f64>>,
+    own: OwnValues,
 }
 
-impl Eliminated {
-    fn new(terms: &WindowTerms, shared: usize, damping: f64) -> Self {
+/// How a window's own values follow the shared ones.
+pub(super) struct OwnValues {
+    /// Step of the own values = -(own^-1 gradient) - (own^-1 cross) step of the shared ones.
+    gradient: DVector<f64>,
+    cross: DMatrix<f64>,
+    /// Predicted decrease of the cost if only the own values take a step.
+    decrease: f64,
+}
+
+impl<'t> Eliminated<'t> {
+    fn new(terms: &'t WindowTerms, shared: usize, damping: f64) -> Self {
         let start_states = terms.gradient.len() - shared;
+        if start_states == 0 {
+            return Self {
+                matrix: Cow::Borrowed(&terms.hessian),
+                gradient: Cow::Borrowed(&terms.gradient),
+                own: OwnValues {
+                    gradient: DVector::zeros(0),
+                    cross: DMatrix::zeros(0, shared),
+                    decrease: 0.0,
+                },
+            };
+        }
         let part = |first: (usize, usize), size: (usize, usize)| {
             terms.hessian.view(first, size).into_owned()
         };
@@ -150,17 +167,21 @@ impl Eliminated {
             terms.hessian.view((0, 0), (shared, shared)) - cross.transpose() * &local_cross;
         let gradient = terms.gradient.rows(0, shared) - cross.transpose() * &local_gradient;
         Self {
-            matrix,
-            gradient,
-            own_decrease: 0.5 * own_gradient.dot(&local_gradient),
-            local_gradient,
-            local_cross,
+            matrix: Cow::Owned(matrix),
+            gradient: Cow::Owned(gradient),
+            own: OwnValues {
+                decrease: 0.5 * own_gradient.dot(&local_gradient),
+                gradient: local_gradient,
+                cross: local_cross,
+            },
         }
     }
+}
 
+impl OwnValues {
     /// The step of the window's own values that belongs to a step of the shared ones.
-    pub fn local_step(&self, shared_step: &DVector<f64>) -> DVector<f64> {
-        -(&self.local_gradient + &self.local_cross * shared_step)
+    pub fn step(&self, shared_step: &DVector<f64>) -> DVector<f64> {
+        -(&self.gradient + &self.cross * shared_step)
     }
 }
 
@@ -205,9 +226,19 @@ fn scatter(part: &DVector<f64>, all: &mut DVector<f64>, places: &[usize]) {
 }
 
 fn scatter_matrix(part: &DMatrix<f64>, all: &mut DMatrix<f64>, places: &[usize]) {
+    if is_each_in_its_place(places, all.nrows()) {
+        *all += part;
+        return;
+    }
     for (j, &column) in places.iter().enumerate() {
-        for (i, &row) in places.iter().enumerate() {
-            all[(row, column)] += part[(i, j)];
+        let mut all = all.column_mut(column);
+        for (value, &row) in part.column(j).iter().zip(places) {
+            all[row] += value;
         }
     }
+}
+
+/// Whether values go where they are, and to every place, as in windows of a model without values per log.
+fn is_each_in_its_place(places: &[usize], size: usize) -> bool {
+    places.len() == size && places.iter().enumerate().all(|(k, place)| k == *place)
 }

@@ -186,8 +186,8 @@ impl<'a> Search<'a> {
         let windows = normal.windows.iter().zip(&self.shooting.windows);
         let start_states = windows
             .zip(&self.at.start_states)
-            .map(|((part, window), local)| {
-                let step = part.local_step(&taken.select_rows(self.layout.places(window)));
+            .map(|((own, window), local)| {
+                let step = own.step(&taken.select_rows(self.layout.places(window)));
                 step.iter().zip(local).map(|(d, x)| x + d).collect()
             });
         Some(Step(Point {

@@ -332,7 +332,12 @@ impl<'l> Shooting<'l> {
                 packs.flat_map(|pack| of_motion(pack, &commands)).collect()
             }
             Measure::Torques { rows, packs } => {
-                let acting = Acting::of(dynamics, values, (self.logs, rows), slopes_of);
+                let acting = Acting::of(
+                    dynamics,
+                    values,
+                    (self.logs, rows, &self.windows),
+                    slopes_of,
+                );
                 let packs = packs.par_iter();
                 packs
                     .flat_map(|pack| of_torques(pack, (rows.as_slice(), &acting)))

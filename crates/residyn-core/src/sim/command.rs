@@ -1,6 +1,7 @@
 //! Delays and lags between commanded and acting torque: linear filters of the command, independent of the state.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use super::{Hold, Point};
 use crate::data::{Joint, Log, Measured, TorqueColumn};
@@ -90,11 +91,23 @@ impl<'l> Commands<'l> {
     /// # Panics
     /// If the log lacks a measured column that the model reads: [`Log::check_measured`] tells.
     pub fn of_log<'p>(model: impl Into<Point<'p>>, log: &'l Log) -> Self {
+        Self::of_rows(model, log, 0..log.rows())
+    }
+
+    /// The same for some rows of a log, the first of which counts as held for ever before.
+    ///
+    /// # Panics
+    /// As [`Commands::of_log`].
+    pub fn of_rows<'p>(model: impl Into<Point<'p>>, log: &'l Log, rows: Range<usize>) -> Self {
         let model = model.into();
-        let tau = (0..log.joints()).map(|joint| log.held_torques(joint));
+        let tau = (0..log.joints()).map(|joint| match log.held_torques(joint) {
+            Cow::Borrowed(all) => Cow::Borrowed(&all[rows.clone()]),
+            Cow::Owned(all) => Cow::Owned(all[rows.clone()].to_vec()),
+        });
         let measured = Measured::named(&log.measured, model.dynamics.measured_names());
-        let measured = measured.into_iter().map(Vec::as_slice);
-        Self::held_in(model, &log.time, tau.collect(), measured.collect())
+        let measured = measured.into_iter().map(|all| &all[rows.clone()]);
+        let (tau, measured) = (tau.collect(), measured.collect());
+        Self::held_in(model, &log.time[rows.clone()], tau, measured)
     }
 
     /// What the measured columns read from a time (s) on.
@@ -298,13 +311,18 @@ struct Instant {
 
 impl<'l> History<'l> {
     fn new(time: &'l [f64], command: Cow<'l, [f64]>, delay: f64, lag: f64) -> Self {
+        let starting = |value: f64| {
+            let mut all = Vec::with_capacity(time.len());
+            all.push(value);
+            all
+        };
         let mut history = Self {
             delay,
             lag,
             time,
-            integral: vec![0.0],
-            output: vec![command[0]],
-            output_by_lag: vec![0.0],
+            integral: starting(0.0),
+            output: starting(command[0]),
+            output_by_lag: starting(0.0),
             command,
         };
         for row in 1..time.len() {
@@ -334,7 +352,8 @@ impl<'l> History<'l> {
     }
 
     fn at(&self, time: f64) -> Instant {
-        self.after(time - self.time[0])
+        let since = time - self.time[0];
+        self.instant(since - self.delay, self.next(since))
     }
 
     /// The instant just before each row: a walk, since the commands that act there come in order.
@@ -350,11 +369,10 @@ impl<'l> History<'l> {
         rows.collect()
     }
 
-    /// The instant just before `since` seconds after the first row.
-    fn after(&self, since: f64) -> Instant {
+    /// The first row whose command has not acted `since` seconds after the first row.
+    fn next(&self, since: f64) -> usize {
         let time = since - self.delay;
-        let next = self.time.partition_point(|t| *t - self.time[0] < time);
-        self.instant(time, next)
+        self.time.partition_point(|t| *t - self.time[0] < time)
     }
 
     /// The time of a row since the first. Time differences keep the digits that large times lose.
@@ -387,14 +405,19 @@ impl<'l> History<'l> {
     fn means(&self, from: f64, to: f64, parts: usize) -> impl Iterator<Item = Mean> {
         let length = (to - from) / parts as f64;
         let [from, to] = [from, to].map(|time| time - self.time[0]);
-        let mut before = self.after(from);
+        let mut next = self.next(from);
+        let mut before = self.instant(from - self.delay, next);
         (1..=parts).map(move |part| {
             let end = if part == parts {
                 to
             } else {
                 from + length * part as f64
             };
-            let now = self.after(end);
+            let time = end - self.delay;
+            while next < self.time.len() && self.since(next) < time {
+                next += 1;
+            }
+            let now = self.instant(time, next);
             let mean = before.mean_until(&now);
             before = now;
             mean

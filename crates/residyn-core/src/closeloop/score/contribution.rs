@@ -7,7 +7,7 @@ use crate::closeloop::establish::{Chosen, Standing};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::refine::Refined;
-use crate::closeloop::select::{Losses, p_of_gains, p_value};
+use crate::closeloop::select::{Losses, p_of_gains};
 use crate::digits::amount_of;
 use crate::identify::FitError;
 use crate::model::{FittedEffect, Model, Parameter, PerLogValue, Status};
@@ -92,7 +92,7 @@ pub(in crate::closeloop) fn findings(
             effect: refined.after.model.effects[k].clone(),
             expression,
             parameters,
-            p_value: p_value(&refined.problem, &refined.after, k).unwrap_or_else(of_refit),
+            p_value: refined.p_value(k).unwrap_or_else(of_refit),
             error_reduction: less.as_ref().map(reduction).map_err(Clone::clone),
             status: standing.status,
             reason: standing.reason.clone(),

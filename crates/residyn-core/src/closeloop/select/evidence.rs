@@ -5,7 +5,7 @@ use super::candidate::switches;
 use super::trial::differences;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::identify::{squared_distance, submatrix, uncertainty};
+use crate::identify::{Uncertainty, squared_distance, submatrix, uncertainty};
 
 /// Fall of the loss as a share of the loss before.
 pub fn gain(before: &[f64], after: &[f64]) -> f64 {
@@ -15,13 +15,27 @@ pub fn gain(before: &[f64], after: &[f64]) -> f64 {
 /// Probability, by the cluster-robust Wald test, of the fitted values of the k-th effect if it were absent. `None` for
 /// an effect that no parameter value switches off.
 pub fn p_value(problem: &Problem<'_>, fitted: &Fitted, k: usize) -> Option<f64> {
+    p_value_by(
+        &uncertainty(&problem.shooting, &fitted.fit),
+        problem,
+        fitted,
+        k,
+    )
+}
+
+/// The same with a known uncertainty of the fit, which takes long to find where there are many values.
+pub fn p_value_by(
+    uncertainty: &Uncertainty,
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    k: usize,
+) -> Option<f64> {
     let own = fitted.model.place_of(k);
     let all = switches(&fitted.model);
     let switches = (fitted.fit).columns_of(|k| own.contains(&k) && all.contains(&k));
     if switches.is_empty() {
         return None;
     }
-    let uncertainty = uncertainty(&problem.shooting, &fitted.fit);
     let covariance = submatrix(&uncertainty.covariance, &switches, &switches);
     let value = |&i: &usize| {
         let column = fitted.fit.columns[i];

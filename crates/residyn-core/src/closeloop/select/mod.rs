@@ -23,7 +23,7 @@ mod trial;
 pub(super) use self::baseline::{baseline_friction, usual_forces};
 pub use self::candidate::candidates;
 pub(super) use self::candidate::{acting, best_start, is_of_too_many, screened_cost, starts};
-pub(super) use self::evidence::{gain, p_of_gains, p_value};
+pub(super) use self::evidence::{gain, p_of_gains, p_value, p_value_by};
 pub(super) use self::folds::{Folds, left_out_losses};
 pub(super) use self::losses::Losses;
 pub(super) use self::open_loop_check::is_worse;

@@ -178,16 +178,13 @@ fn differences(model: &Model, balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec
     let smoothing = Smoothing::of(log);
     let logged = Smooth::by(&smoothing, log, &[]);
     let commands = Commands::of_log(&*in_log, log);
-    let of_joint = |(joint, tau): (Joint, &Vec<f64>)| match commands.delivered(joint) {
-        Some(means) => {
-            let means: Vec<f64> = means.iter().map(|mean| mean.value).collect();
-            smoothing.delivered(log, joint.index(), &means)
-        }
-        None => tau.clone(),
-    };
-    let acting = Joint::all(balance.joints).zip(&logged.tau).map(of_joint);
+    let means = Joint::all(balance.joints).map(|joint| {
+        let means = commands.delivered(joint)?;
+        Some(means.iter().map(|mean| mean.value).collect())
+    });
+    let means: Vec<Option<Vec<f64>>> = means.collect();
     let acting = Smooth {
-        tau: acting.collect(),
+        tau: smoothing.delivered(log, &smoothing.whole(), (&logged.tau, &means)),
         ..logged.clone()
     };
     let found = balance_of(&in_log, &acting);
