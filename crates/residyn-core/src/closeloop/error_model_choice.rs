@@ -6,7 +6,7 @@ use super::fit::NOTHING;
 use super::problem::Problem;
 use super::select::{baseline_friction, usual_forces};
 use crate::data::statistics::{mean, upper_median};
-use crate::data::{Log, Quantity};
+use crate::data::{Log, Quantity, Smoothing};
 use crate::identify::{Window, cut, fit_torques};
 use crate::model::Model;
 use crate::sim::FIT_S;
@@ -15,8 +15,9 @@ use crate::sim::metric::{errors_in, torque_error};
 impl Problem<'_> {
     /// Whether a controller prescribes the motion, so that the declared model, with baseline friction, explains far
     /// more of the torques than of half a second of open-loop motion, or the joints are too many for a fit of the
-    /// motion in reasonable time. Never for a model that gives accelerations. Commands of few joints tell more by the
-    /// motion that they lead to: a closed loop does not diverge.
+    /// motion in reasonable time. Never for a model that gives accelerations. Commands of one joint, of drives whose gains
+    /// are unknown, or in logs whose rows are too far apart for all of the torques, tell more by the motion that they lead to:
+    /// a closed loop does not diverge.
     pub(super) fn is_prescribed(&self) -> bool {
         self.tells_more_of_torques().unwrap_or(false)
     }
@@ -24,7 +25,11 @@ impl Problem<'_> {
     /// `None` if there are no torques to compare, or no motion.
     fn tells_more_of_torques(&self) -> Option<bool> {
         let is_short = self.declared.joints <= self.settings.fit.most_joints_by_motion;
-        if is_short && self.declared.driven_by() == Quantity::Command {
+        let is_commanded = self.declared.driven_by() == Quantity::Command;
+        let shows_torques = self.declared.joints > 1
+            && self.declared.knows_law()
+            && self.logs.iter().all(Smoothing::passes_full_band);
+        if is_short && is_commanded && !shows_torques {
             return Some(false);
         }
         let own = &self.declared.effects;
@@ -34,7 +39,7 @@ impl Problem<'_> {
         let smoothed = self.smoothed(&model);
         let fitted = fit_torques(self.solver, &smoothed, self.declared, self.logs).ok()?;
         let torque = torque_error(&fitted.model, self.logs)?.relative;
-        if !is_short {
+        if !is_short || is_commanded {
             return Some(true);
         }
         let far = self.settings.fit.motion_over_torque * torque;

@@ -89,6 +89,16 @@ impl Model {
         self.parameters.iter().filter(is_own).collect()
     }
 
+    /// Whether commands drive the joints by laws without a free parameter: the torques that they ask for are known.
+    pub fn knows_law(&self) -> bool {
+        let is_free = |name: &str| {
+            let mut free = self.parameters.iter().filter(|own| !own.fixed);
+            free.any(|own| own.name == name)
+        };
+        let is_known = |law: &Located<Formula>| !law.value.names().into_iter().any(is_free);
+        (self.equations.drive.as_ref()).is_some_and(|drive| drive.formulas().iter().all(is_known))
+    }
+
     /// The names that formulas of `[drive]` may use.
     pub(super) fn drive_names(&self) -> Vec<String> {
         self.names_under(Quantity::Command)
