@@ -420,7 +420,7 @@ fn is_used(log: &Log, time: f64) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::Smooth;
+    use super::{Smooth, Smoothing};
     use crate::data::{Interval, Log, TorqueColumn};
 
     /// The torque is the cosine, whatever the column holds of it.
@@ -462,5 +462,48 @@ mod tests {
         assert!((0.49..0.51).contains(&smooth.time[0]));
         assert!(smooth.time.iter().all(|t| !(1.0..=1.5).contains(t)));
         assert!((2400..2510).contains(&smooth.rows()));
+    }
+
+    #[test]
+    fn a_hundred_rows_a_second_pass_what_the_filter_does() {
+        let passes = |step_s: f64| {
+            let log = Log {
+                time: (0..50).map(|k| 7.3 + step_s * f64::from(k)).collect(),
+                ..Log::empty(1)
+            };
+            Smoothing::passes_full_band(&log)
+        };
+        assert!(passes(0.005) && passes(0.01));
+        assert!(!passes(0.0125) && !passes(1.0 / 14.0));
+    }
+
+    /// A part of a log that is smoothed by itself reads as the whole does.
+    #[test]
+    fn a_stretch_is_smoothed_as_the_whole() {
+        let time: Vec<f64> = (0..3000).map(|k| 0.005 * f64::from(k)).collect();
+        let channel: Vec<f64> = time
+            .iter()
+            .map(|t| (9.0 * t).sin() + (70.0 * t).cos())
+            .collect();
+        let log = Log {
+            q: vec![channel.clone()],
+            qd: vec![channel.clone()],
+            tau: vec![channel.clone()],
+            time,
+            ..Log::empty(1)
+        };
+        let smoothing = Smoothing::precise(&log).thinned();
+        let stretch = smoothing.stretch(&(1200..=1400), 0.1);
+        let part = channel[stretch.logged.clone()].to_vec();
+        assert!(part.len() < 900, "{} rows", part.len());
+        let [part, whole] = [
+            smoothing.held_in(&stretch, &[part]),
+            smoothing.held_in(&smoothing.whole(), &[channel]),
+        ];
+        let rows = stretch.used.clone();
+        assert!(rows.len() > 40, "{rows:?}");
+        for row in rows {
+            assert!((part[0][row] - whole[0][row]).abs() < 1e-9, "row {row}");
+        }
     }
 }

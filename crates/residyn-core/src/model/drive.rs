@@ -173,20 +173,35 @@ impl Model {
 #[cfg(test)]
 mod tests {
     use crate::data::Joint;
-    use crate::model::Library;
+    use crate::model::{Library, Model};
+
+    /// Two joints on position loops of a common stiffness `kp`, declared like this, and their own known damping.
+    fn pair(kp: &str) -> Model {
+        let text = format!(
+            "[system]\nname = \"pair\"\njoints = 2\n[parameters]\nkp = {kp}\nJ = {{ value = 1.0 }}\n\
+             kd_1 = {{ value = 1.0, fixed = true }}\nkd_2 = {{ value = 1.0, fixed = true }}\n\
+             [drive]\ntau1 = \"kp*(cmd1 - q1) - kd_1*qd1\"\ntau2 = \"kp*(cmd2 - q2) - kd_2*qd2\"\n\
+             [dynamics]\nqdd1 = \"tau1/J\"\nqdd2 = \"tau2/J\"\n"
+        );
+        let library = Library::built_in();
+        library.model_from_text("pair.toml", &text).unwrap()
+    }
 
     #[test]
     fn constants_of_one_drive_belong_to_its_joint() {
-        let text = "[system]\nname = \"pair\"\njoints = 2\n[parameters]\nkp = { value = 1.0 }\nkd_1 = { value = 1.0 }\nkd_2 = { value = 1.0 }\nJ = { value = 1.0 }\n\
-            [drive]\ntau1 = \"kp*(cmd1 - q1) - kd_1*qd1\"\ntau2 = \"kp*(cmd2 - q2) - kd_2*qd2\"\n\
-            [dynamics]\nqdd1 = \"tau1/J\"\nqdd2 = \"tau2/J\"\n";
-        let model = Library::built_in()
-            .model_from_text("pair.toml", text)
-            .unwrap();
+        let model = pair("{ value = 1.0 }");
         let names = |joint: usize| -> Vec<&str> {
             let own = model.drive_parameters(Joint::at(joint)).into_iter();
             own.map(|parameter| parameter.name.as_str()).collect()
         };
         assert_eq!([names(0), names(1)], [["kd_1"], ["kd_2"]]);
+    }
+
+    #[test]
+    fn laws_without_free_gains_are_known() {
+        assert!(pair("{ value = 1.0, fixed = true }").knows_law());
+        assert!(!pair("{ value = 1.0 }").knows_law());
+        let pendulum = Library::built_in().model("pendulum").unwrap();
+        assert!(!pendulum.knows_law(), "torques drive it");
     }
 }
