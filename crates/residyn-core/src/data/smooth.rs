@@ -227,13 +227,13 @@ impl Smoothing {
         // Readings are finer than means between them, and equal where nothing is delayed.
         let is_added = log.torque == TorqueColumn::Sampled;
         let channel = |(joint, means): (usize, &Option<Vec<f64>>)| {
-            let means = means.as_ref()?.iter();
+            let means = means.as_ref()?;
+            if !is_added {
+                return Some(means.clone());
+            }
             let commanded = log.held_torques(joint);
-            let added = || means.clone().zip(&commanded[stretch.logged.clone()]);
-            Some(match is_added {
-                true => added().map(|(mean, commanded)| mean - commanded).collect(),
-                false => means.copied().collect(),
-            })
+            let both = means.iter().zip(&commanded[stretch.logged.clone()]);
+            Some(both.map(|(mean, commanded)| mean - commanded).collect())
         };
         let channels: Vec<Vec<f64>> = means.iter().enumerate().filter_map(channel).collect();
         let mut filtered = self.held_in(stretch, &channels).into_iter();

@@ -361,9 +361,7 @@ impl<'l> History<'l> {
         let mut next = 0;
         let rows = (0..self.time.len()).map(|row| {
             let time = self.since(row) - self.delay;
-            while next < row && self.since(next) < time {
-                next += 1;
-            }
+            next = self.walked(next, time);
             self.instant(time, next)
         });
         rows.collect()
@@ -373,6 +371,13 @@ impl<'l> History<'l> {
     fn next(&self, since: f64) -> usize {
         let time = since - self.delay;
         self.time.partition_point(|t| *t - self.time[0] < time)
+    }
+
+    /// The same from a row on, for times in ascending order less the delay.
+    fn walked(&self, from: usize, time: f64) -> usize {
+        let later = from..self.time.len();
+        let mut not_acted = later.filter(|row| self.since(*row) >= time);
+        not_acted.next().unwrap_or(self.time.len())
     }
 
     /// The time of a row since the first. Time differences keep the digits that large times lose.
@@ -414,9 +419,7 @@ impl<'l> History<'l> {
                 from + length * part as f64
             };
             let time = end - self.delay;
-            while next < self.time.len() && self.since(next) < time {
-                next += 1;
-            }
+            next = self.walked(next, time);
             let now = self.instant(time, next);
             let mean = before.mean_until(&now);
             before = now;
