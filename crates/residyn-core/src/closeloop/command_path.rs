@@ -7,6 +7,7 @@
 use rand::Rng;
 
 use super::by_motion::{Comparison, estimate};
+use super::drive_limits;
 use super::error::StudyError;
 use super::fit::Declared;
 use super::limbs::Limb;
@@ -16,7 +17,7 @@ use super::stage::Watch;
 use crate::data::{Joint, Log};
 use crate::model::{AlikeOn, Effect, FittedEffect, Library, Model};
 
-/// As [`Searched::by`], with the filter of commands that the motion asks for.
+/// As [`drive_limits::searched`], with the filter of commands that the motion asks for.
 ///
 /// # Errors
 /// As [`Problem::fit_declared`].
@@ -26,7 +27,7 @@ pub(super) fn searched<'a>(
     rng: &mut impl Rng,
     watch: &dyn Watch,
 ) -> Result<Searched<'a>, StudyError> {
-    let best = Searched::by(declared, apart, rng, watch)?;
+    let best = drive_limits::searched(declared, apart, rng, watch)?;
     if !best.declared.problem.is_by_law() || !is_in_doubt(&best) {
         return Ok(best);
     }
@@ -41,14 +42,12 @@ fn searched_on<'a>(
     watch: &dyn Watch,
 ) -> Option<Searched<'a>> {
     let Declared { problem, fitted } = best.declared.clone();
-    let limb = Limb::of(&problem, &[], Joint::all(problem.declared.joints).collect());
     let found = &best.chosen.after.model;
-    let enough =
-        loss_of_motion(&problem, &limb, found)? * (1.0 - problem.settings.select.round_gain);
+    let enough = loss_of_motion(&problem, found)? * (1.0 - problem.settings.select.round_gain);
     let of_filter = |library: &'a Library| {
         let filter = library.effects().iter().find(|effect| effect.is_filter())?;
         let model = filtered_by(filter, &problem, found)?;
-        Some((loss_of_motion(&problem, &limb, &model)?, library, model))
+        Some((loss_of_motion(&problem, &model)?, library, model))
     };
     let filters = problem.library.of_one_filter().iter();
     let likeliest = filters
@@ -66,7 +65,7 @@ fn searched_on<'a>(
     };
     let mut other = Searched::from(first, alone, apart, rng, watch);
     other.declared.problem.library = problem.library;
-    let loss = loss_of_motion(&problem, &limb, &other.chosen.after.model)?;
+    let loss = loss_of_motion(&problem, &other.chosen.after.model)?;
     (loss < enough).then_some(other)
 }
 
@@ -110,7 +109,8 @@ fn is_in_doubt(searched: &Searched<'_>) -> bool {
 }
 
 /// The loss of the motion under the commands, after a short fit of a model to it.
-fn loss_of_motion(problem: &Problem<'_>, limb: &Limb, model: &Model) -> Option<f64> {
-    let trial = Comparison::of(problem, limb).short(model);
+pub(super) fn loss_of_motion(problem: &Problem<'_>, model: &Model) -> Option<f64> {
+    let limb = Limb::of(problem, &[], Joint::all(problem.declared.joints).collect());
+    let trial = Comparison::of(problem, &limb).short(model);
     estimate(&trial, model).ok().map(|fitted| fitted.loss())
 }

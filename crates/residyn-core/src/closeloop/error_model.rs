@@ -21,20 +21,23 @@ pub enum ErrorModel {
 impl Problem<'_> {
     /// Whether its errors can show an effect.
     pub(super) fn shows(&self, effect: &Effect) -> bool {
-        self.error_model.shows(effect, self.declared.driven_by())
+        self.error_model.shows(effect, self.declared)
     }
 }
 
 impl ErrorModel {
     /// Whether these errors can show an effect. Torques are computed from the motion as it was read, and the torque
-    /// that acts must determine the command: an effect that explains any command would always fit.
-    fn shows(self, effect: &Effect, driven_by: Quantity) -> bool {
+    /// that acts must determine the command: an effect that explains any command would always fit. A limit explains large
+    /// ones only, if it is known what the law asks for.
+    fn shows(self, effect: &Effect, declared: &Model) -> bool {
         match self {
             Self::OutputError => effect.shows_in == ShowsIn::Any,
             Self::InverseDynamics => {
                 !matches!(effect.entry, Entry::Reading(_))
-                    && effect.distinguishes_command()
-                    && (effect.shows_in != ShowsIn::LawTorques || driven_by == Quantity::Command)
+                    && (effect.distinguishes_command()
+                        || declared.knows_law() && effect.limits_command())
+                    && (effect.shows_in != ShowsIn::LawTorques
+                        || declared.driven_by() == Quantity::Command)
             }
         }
     }

@@ -13,6 +13,7 @@ mod command_path;
 mod diagnostics;
 mod discriminate;
 mod drive_gain;
+mod drive_limits;
 mod error;
 mod error_model;
 mod error_model_choice;

@@ -57,7 +57,7 @@ impl Found<'_> {
             let own = &present[place];
             let like = usual.iter().filter(|new| new.replaces(own, &usual));
             let like = like.map(|usual| usual.effect.on(own.joint));
-            let as_good = like.chain(parts(problem.effects(), own));
+            let as_good = like.chain(parts(problem, own));
             let mut doubts: Vec<Doubt> = Vec::new();
             for instead in as_good {
                 let is_new = !doubts.iter().any(|known| known.instead.is_same(&instead));

@@ -370,19 +370,35 @@ impl Effect {
     /// Whether the acting torque determines the commanded one, at typical values: it grows with the command everywhere.
     /// A force that depends on the command may cancel it.
     pub fn distinguishes_command(&self) -> bool {
-        let formula = match &self.entry {
-            Entry::Torque(formula) => formula,
-            Entry::Force(formula) => return !formula.names().contains(&"tau"),
-            _ => return true,
+        match &self.entry {
+            Entry::Torque(formula) => {
+                (self.acting(formula, COMMANDS)).is_sorted_by(|less, more| less < more)
+            }
+            Entry::Force(formula) => !formula.names().contains(&"tau"),
+            _ => true,
+        }
+    }
+
+    /// Whether the acting torque determines small commands alone, at typical values, and never falls with a larger one: a
+    /// limit. Of a command beyond it, the torque says no more than that it is beyond.
+    pub fn limits_command(&self) -> bool {
+        let Entry::Torque(formula) = &self.entry else {
+            return false;
         };
+        let grows = (self.acting(formula, 1)).is_sorted_by(|less, more| less < more);
+        let all = self.acting(formula, COMMANDS);
+        grows && all.is_sorted() && !self.distinguishes_command()
+    }
+
+    /// The torques that act under so many commands on either side of zero, at typical values.
+    fn acting(&self, formula: &Formula, commands: i32) -> Vec<f64> {
         let values: Vec<f64> = self.parameters.iter().map(|p| p.typical).collect();
         let acting = |tau: f64| {
             let at = |name: &str| if name == "tau" { tau } else { 0.0 };
             self.evaluate(formula, &values, at)
         };
-        let commands = (-COMMANDS..=COMMANDS).map(|k| f64::from(k) * COMMAND_STEP);
-        let acting: Vec<f64> = commands.map(acting).collect();
-        acting.is_sorted_by(|less, more| less < more)
+        let commands = (-commands..=commands).map(|k| f64::from(k) * COMMAND_STEP);
+        commands.map(acting).collect()
     }
 
     /// Whether the effect acts alike on a joint and on its mirror image: with the joint's axis turned round, the same values of

@@ -16,6 +16,7 @@ static EMBEDDED: LazyLock<Library> = LazyLock::new(|| Library {
     effects: embedded("effects", Effect::from_text).into(),
     probes: embedded("probes", Effect::from_text).into(),
     of_one_filter: Arc::default(),
+    without_limits: Arc::default(),
 });
 
 /// The effects and systems known by name: the embedded ones and a user's own. A clone shares them.
@@ -45,6 +46,7 @@ pub struct Library {
     probes: Arc<[Effect]>,
     /// Made on first use.
     of_one_filter: Arc<OnceLock<Vec<Library>>>,
+    without_limits: Arc<OnceLock<Box<Library>>>,
 }
 
 impl Library {
@@ -58,16 +60,21 @@ impl Library {
 
     /// A library without effects and probes, in which nothing can be found.
     pub fn empty() -> Self {
+        Self::of(Arc::default(), Arc::default())
+    }
+
+    fn of(effects: Arc<[Effect]>, probes: Arc<[Effect]>) -> Self {
         Self {
-            effects: Arc::default(),
-            probes: Arc::default(),
+            effects,
+            probes,
             of_one_filter: Arc::default(),
+            without_limits: Arc::default(),
         }
     }
 
     /// Add an effect; it replaces a known one of the same name.
     #[must_use]
-    pub fn with_effect(mut self, effect: Effect) -> Self {
+    pub fn with_effect(self, effect: Effect) -> Self {
         let known = self.effects.iter();
         let mut effects: Vec<Effect> = known
             .filter(|known| known.name != effect.name)
@@ -75,9 +82,7 @@ impl Library {
             .collect();
         let place = effects.partition_point(|known| known.name < effect.name);
         effects.insert(place, effect);
-        self.effects = effects.into();
-        self.of_one_filter = Arc::default();
-        self
+        Self::of(effects.into(), self.probes)
     }
 
     /// All effects, by name.
@@ -94,17 +99,24 @@ impl Library {
     /// The library once for each filter of commands, without the others.
     pub(crate) fn of_one_filter(&self) -> &[Self] {
         let with_one = |one: &Effect| {
-            let is_other = |effect: &&Effect| effect.is_filter() && effect.name != one.name;
-            let kept = self.effects.iter().filter(|effect| !is_other(effect));
-            Self {
-                effects: kept.cloned().collect(),
-                probes: self.probes.clone(),
-                of_one_filter: Arc::default(),
-            }
+            let is_other = |effect: &Effect| effect.is_filter() && effect.name != one.name;
+            self.with_those(|effect| !is_other(effect))
         };
         let filters = self.effects.iter().filter(|effect| effect.is_filter());
         self.of_one_filter
             .get_or_init(|| filters.map(with_one).collect())
+    }
+
+    /// The library without limits of drives' torques.
+    pub(crate) fn without_limits(&self) -> &Self {
+        self.without_limits
+            .get_or_init(|| self.with_those(|effect| !effect.limits_command()).into())
+    }
+
+    /// The library with some of its effects.
+    fn with_those(&self, are_kept: impl Fn(&Effect) -> bool) -> Self {
+        let kept = self.effects.iter().filter(|effect| are_kept(effect));
+        Self::of(kept.cloned().collect(), self.probes.clone())
     }
 
     /// The effect of this name.

@@ -345,7 +345,7 @@ impl<'a> Search<'a> {
         loop {
             let added = problem.added(&current.fitted.model);
             let effects = &current.fitted.model.effects;
-            let simpler = simpler(problem.effects(), effects, added.clone()).into_iter();
+            let simpler = simpler(problem, effects, added.clone()).into_iter();
             let mut sets: Vec<_> = simpler.map(|set| set[declared..].to_vec()).collect();
             let exchanges = exchanges(problem, &current.fitted);
             sets.extend(exchanges.into_iter().map(|exchange| exchange.set));
@@ -426,7 +426,7 @@ impl<'a> Search<'a> {
             return None;
         }
         let declared = &problem.declared.effects;
-        let set = repaired(problem.effects(), declared, trial.added(problem));
+        let set = repaired(problem, declared, trial.added(problem));
         let found = self.fitted_from(trial, &set, below);
         found.filter(|found| found.is_valid(problem))
     }

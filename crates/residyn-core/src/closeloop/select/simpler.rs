@@ -1,21 +1,22 @@
 use std::ops::Range;
 
 use super::trial::is_consistent;
+use crate::closeloop::problem::Problem;
 use crate::model::{Effect, EffectParameter, FittedEffect};
 
 /// Every set in which one effect is replaced by some of the effects that it contains and the set lacks, fewest first.
 /// Only effects at the indices `added` change.
 pub(super) fn simpler(
-    library: &[Effect],
+    problem: &Problem<'_>,
     effects: &[FittedEffect],
     added: Range<usize>,
 ) -> Vec<Vec<FittedEffect>> {
     let mut all = Vec::new();
     for k in added {
         let old = &effects[k];
-        for parts in parts_of(library, &old.effect) {
+        for parts in parts_of(problem.effects(), &old.effect) {
             let parts: Vec<FittedEffect> = (parts.into_iter())
-                .map(|effect| part_of(old, effect))
+                .map(|effect| part_of(problem, old, effect))
                 .collect();
             let mut rest = effects.to_vec();
             rest.remove(k);
@@ -36,7 +37,7 @@ fn is_free_of(new: &FittedEffect, others: &[FittedEffect]) -> bool {
 /// A set in which each effect whose values are not consistent is replaced by the effects that it contains: all that the
 /// set and the declared effects lack, since simpler sets are found from there.
 pub(super) fn repaired(
-    library: &[Effect],
+    problem: &Problem<'_>,
     declared: &[FittedEffect],
     effects: &[FittedEffect],
 ) -> Vec<FittedEffect> {
@@ -45,19 +46,20 @@ pub(super) fn repaired(
         if is_consistent(effect) {
             return vec![effect.clone()];
         }
-        let richest = parts_of(library, &effect.effect).pop().unwrap_or_default();
-        let parts = richest.into_iter().map(|part| part_of(effect, part));
+        let sets = parts_of(problem.effects(), &effect.effect);
+        let richest = sets.last().into_iter().flatten();
+        let parts = richest.map(|part| part_of(problem, effect, part));
         parts.filter(|part| is_free_of(part, &present)).collect()
     };
     effects.iter().flat_map(mend).collect()
 }
 
 /// The single effects that another contains, with its values: each could take its place alone.
-pub fn parts(library: &[Effect], whole: &FittedEffect) -> Vec<FittedEffect> {
-    let mut sets = parts_of(library, &whole.effect);
+pub fn parts(problem: &Problem<'_>, whole: &FittedEffect) -> Vec<FittedEffect> {
+    let mut sets = parts_of(problem.effects(), &whole.effect);
     sets.retain(|set| set.len() == 1);
     let parts = sets.concat().into_iter();
-    parts.map(|part| part_of(whole, part)).collect()
+    parts.map(|part| part_of(problem, whole, part)).collect()
 }
 
 /// The sets of effects contained in `whole` that have fewer parameters together, fewest first.
@@ -78,56 +80,18 @@ fn parts_of<'l>(library: &'l [Effect], whole: &Effect) -> Vec<Vec<&'l Effect>> {
 }
 
 /// A simpler effect that another contains, with the values of the parameters of the same names or, if there are none, of
-/// the same unit and measure.
-fn part_of(whole: &FittedEffect, part: &Effect) -> FittedEffect {
-    let mut fitted = FittedEffect::absent(part, whole.joint);
+/// the same unit.
+fn part_of(problem: &Problem<'_>, whole: &FittedEffect, part: &Effect) -> FittedEffect {
+    let part = problem.measured(part, whole.joint);
+    let mut fitted = FittedEffect::absent(&part, whole.joint);
     let known = whole.effect.parameters.iter().zip(&whole.values);
     for (parameter, slot) in part.parameters.iter().zip(&mut fitted.values) {
         let is_same = |(own, _): &(&EffectParameter, _)| own.name == parameter.name;
-        let is_alike = |(own, _): &(&EffectParameter, _)| {
-            own.unit == parameter.unit && own.measure == parameter.measure
-        };
+        let is_alike = |(own, _): &(&EffectParameter, _)| own.unit == parameter.unit;
         let same = known.clone().find(is_same);
         if let Some((_, (value, _))) = same.or_else(|| known.clone().find(is_alike)) {
             *slot = (*value, None);
         }
     }
     fitted
-}
-
-#[cfg(test)]
-mod tests {
-    use super::parts;
-    use crate::data::Joint;
-    use crate::model::{FittedEffect, Library};
-
-    #[test]
-    fn a_simpler_effect_begins_with_the_values_of_the_richer_one() {
-        let library = Library::built_in();
-        for (whole, values, part, value) in [
-            (
-                "stribeck_friction",
-                vec![0.3, 0.5, 0.1],
-                "coulomb_friction",
-                0.3,
-            ),
-            (
-                "torque_speed_limit",
-                vec![1.2, 8.0],
-                "actuator_saturation",
-                1.2,
-            ),
-        ] {
-            let mut whole = FittedEffect::absent(library.effect(whole).unwrap(), Joint::at(0));
-            for (slot, value) in whole.values.iter_mut().zip(values) {
-                slot.0 = value;
-            }
-            let parts = parts(library.effects(), &whole);
-            let part = parts
-                .iter()
-                .find(|known| known.effect.name == part)
-                .unwrap();
-            assert_eq!(part.values[0].0, value);
-        }
-    }
 }

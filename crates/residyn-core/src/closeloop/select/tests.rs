@@ -7,7 +7,7 @@ use super::candidate::candidates;
 use super::exchange::{Exchange, exchanges};
 use super::folds::{Folds, left_out_losses, predicted};
 use super::screening::Screening;
-use super::simpler::{repaired, simpler};
+use super::simpler::{parts, repaired, simpler};
 use super::trial::Trial;
 use crate::closeloop::fit::Declared;
 use crate::closeloop::tests::{Study, absent, pendulum};
@@ -120,16 +120,50 @@ fn what_most_machines_have_is_said_by_effect_files() {
 /// At the largest possible Stribeck velocity, friction does not fall: it is Coulomb friction at the level found.
 #[test]
 fn an_effect_at_a_bound_gives_way_to_what_it_contains() {
-    let library = Library::built_in();
+    let study = Study::of_friction();
     let mut stribeck = absent("stribeck_friction");
     let fastest = stribeck.effect.parameters[2].bounds[1];
     stribeck.values = vec![(0.1, None), (0.2, None), (fastest, None)];
     let set = [absent("joint_spring"), stribeck];
-    let mended = repaired(library.effects(), &[], &set);
+    let mended = repaired(&study.problem(), &[], &set);
     let labels: Vec<String> = mended.iter().map(FittedEffect::label).collect();
     let wanted = ["joint_spring on joint 1", "coulomb_friction on joint 1"];
     assert_eq!(labels, wanted);
     assert_eq!(mended[1].values[0].0, 0.1);
+}
+
+#[test]
+fn a_part_begins_with_the_values_of_the_whole_and_in_the_units_of_its_joint() {
+    let study = Study::of_friction();
+    let mut problem = study.problem();
+    problem.top_torque = vec![40.0];
+    for (whole, values, name, value) in [
+        (
+            "stribeck_friction",
+            vec![0.3, 0.5, 0.1],
+            "coulomb_friction",
+            0.3,
+        ),
+        (
+            "torque_speed_limit",
+            vec![25.0, 8.0],
+            "actuator_saturation",
+            25.0,
+        ),
+    ] {
+        let mut whole = absent(whole);
+        for (slot, value) in whole.values.iter_mut().zip(values) {
+            slot.0 = value;
+        }
+        let parts = parts(&problem, &whole);
+        let part = parts
+            .iter()
+            .find(|known| known.effect.name == name)
+            .unwrap();
+        let [low, high] = part.effect.parameters[0].bounds;
+        assert_eq!(part.values[0].0, value);
+        assert!(low < value && value < high, "{name}: {low} to {high}");
+    }
 }
 
 /// With a free inertia, a torque gain can have any value.
@@ -148,8 +182,8 @@ fn a_set_whose_values_the_logs_do_not_tell_apart_is_not_valid() {
 
 #[test]
 fn simpler_sets_have_fewer_parameters() {
-    let library = Library::built_in();
-    let sets = simpler(library.effects(), &[absent("asymmetric_friction")], 0..1);
+    let study = Study::of_friction();
+    let sets = simpler(&study.problem(), &[absent("asymmetric_friction")], 0..1);
     let mut most: Vec<&str> = (sets.last().unwrap().iter())
         .map(|effect| &*effect.effect.name)
         .collect();
@@ -161,9 +195,9 @@ fn simpler_sets_have_fewer_parameters() {
 /// Friction that a file declares is not added again: no file may hold it twice.
 #[test]
 fn simpler_sets_hold_no_effect_twice() {
-    let library = Library::built_in();
+    let study = Study::of_friction();
     let effects = ["viscous_friction", "asymmetric_friction"].map(absent);
-    let sets = simpler(library.effects(), &effects, 1..2);
+    let sets = simpler(&study.problem(), &effects, 1..2);
     let is_twice = |set: &Vec<FittedEffect>| {
         let again = |effect: &FittedEffect| effect.is_same(&effects[0]);
         set.iter().filter(|effect| again(effect)).count() > 1
@@ -172,7 +206,7 @@ fn simpler_sets_hold_no_effect_twice() {
     let [declared, whole] = effects;
     let mut broken = whole;
     broken.values[0].0 = f64::NAN;
-    let mended = repaired(library.effects(), &[declared], &[broken]);
+    let mended = repaired(&study.problem(), &[declared], &[broken]);
     let names: Vec<&str> = mended.iter().map(|effect| &*effect.effect.name).collect();
     assert!(!names.contains(&"viscous_friction"), "{names:?}");
 }
