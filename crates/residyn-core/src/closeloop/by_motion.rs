@@ -35,6 +35,9 @@ const ESTIMATE: LevenbergMarquardt = at_most(20);
 const fn at_most(most_steps: usize) -> LevenbergMarquardt {
     LevenbergMarquardt {
         most_steps,
+        // Of some thousand residuals, as few as these say nothing of an effect: they move bodies along what the logs do not
+        // determine.
+        enough_to_estimate: 1e-5,
         ..LevenbergMarquardt::USUAL
     }
 }

@@ -81,3 +81,26 @@ impl ErrorModel {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::ErrorModel;
+    use crate::model::Library;
+
+    #[test]
+    fn torques_show_a_limit_only_if_the_law_is_known() {
+        let library = Library::built_in();
+        let shows = |servo: &str, name: &str| {
+            let model = library.model_from_text("servo.toml", servo).unwrap();
+            ErrorModel::InverseDynamics.shows(library.effect(name).unwrap(), &model)
+        };
+        let free = Library::system_text("servo").unwrap();
+        let known = free.replace("unit = \"N m/rad\"", "unit = \"N m/rad\", fixed = true");
+        let known = known.replace("unit = \"N m s/rad\"", "unit = \"N m s/rad\", fixed = true");
+        for limit in ["actuator_saturation", "torque_speed_limit"] {
+            assert!(shows(&known, limit), "{limit}");
+            assert!(!shows(free, limit), "{limit}");
+        }
+        assert!(!shows(&known, "actuator_deadzone") && shows(free, "actuator_gain"));
+    }
+}

@@ -7,7 +7,7 @@ use super::problem::Problem;
 use super::select::{baseline_friction, usual_forces};
 use crate::data::statistics::{mean, upper_median};
 use crate::data::{Log, Quantity, Smoothing};
-use crate::identify::{Window, cut, fit_torques};
+use crate::identify::{Window, cut, fit_torques, has_torques};
 use crate::model::Model;
 use crate::sim::FIT_S;
 use crate::sim::metric::{errors_in, torque_error};
@@ -32,6 +32,9 @@ impl Problem<'_> {
         if is_short && is_commanded && !shows_torques {
             return Some(false);
         }
+        if !is_short || is_commanded {
+            return has_torques(self.declared, self.logs).then_some(true);
+        }
         let own = &self.declared.effects;
         let friction = baseline_friction(self);
         let effects = [own, friction.as_slice()].concat();
@@ -39,9 +42,6 @@ impl Problem<'_> {
         let smoothed = self.smoothed(&model);
         let fitted = fit_torques(self.solver, &smoothed, self.declared, self.logs).ok()?;
         let torque = torque_error(&fitted.model, self.logs)?.relative;
-        if !is_short || is_commanded {
-            return Some(true);
-        }
         let far = self.settings.fit.motion_over_torque * torque;
         if self.motion_error(&fitted.model)? < far {
             return Some(false);

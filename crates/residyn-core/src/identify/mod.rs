@@ -49,6 +49,6 @@ pub use solver::Solver;
 pub use start::start_deviations;
 pub use stiffness::longest_stable_step;
 pub use sums::huber;
-pub use torques::{TorqueFit, fit_torques};
+pub use torques::{TorqueFit, fit_torques, has_torques};
 pub(crate) use values::free_parameters;
 pub use values::{Column, Own, Values};

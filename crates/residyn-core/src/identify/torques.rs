@@ -21,6 +21,17 @@ pub struct TorqueFit<'l> {
     pub shooting: Shooting<'l>,
 }
 
+/// Whether a model can be fitted to torques: it has a torque balance, and the logs have a window.
+pub fn has_torques(model: &Model, logs: &[Log]) -> bool {
+    model.smoothed_torque_balance().is_some() && !torques_of(model, logs).windows.is_empty()
+}
+
+/// The torques of the logged motion, each joint's with a noise of one.
+fn torques_of<'l>(model: &Model, logs: &'l [Log]) -> Shooting<'l> {
+    let (windows, noise) = (cut(logs, WINDOW_S), vec![1.0; model.joints]);
+    Shooting::of_torques(logs, windows, &noise, &model.smoothing_velocities())
+}
+
 /// Fit a model to the torques that the motion in the logs needs, near the values of `declared`. A joint counts by how
 /// well its torque is predicted; bodies stay physical.
 ///
@@ -34,9 +45,7 @@ pub fn fit_torques<'l>(
 ) -> Result<TorqueFit<'l>, FitError> {
     let mut model = with_physical_bodies(model);
     let mut noise = vec![1.0; model.joints];
-    let windows = cut(logs, WINDOW_S);
-    let smoothed = Shooting::of_torques(logs, windows, &noise, &model.smoothing_velocities());
-    let smoothed = smoothed.near(declared);
+    let smoothed = torques_of(&model, logs).near(declared);
     let mut found = None;
     for _ in 0..FITS {
         let balance = model.smoothed_torque_balance().ok_or(FitError::NoWindow)?;

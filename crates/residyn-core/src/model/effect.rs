@@ -476,6 +476,20 @@ mod tests {
     }
 
     #[test]
+    fn limits_determine_small_commands_alone() {
+        let library = Library::built_in();
+        let effects = library.effects().iter();
+        let limits = effects.filter(|effect| effect.limits_command());
+        let names: Vec<&str> = limits.map(|effect| effect.name.as_str()).collect();
+        assert_eq!(names, ["actuator_saturation", "torque_speed_limit"]);
+        // Neither a gain, which determines them all, nor one that determines none of the small ones.
+        let gain = library.effect("actuator_gain").unwrap();
+        assert!(gain.distinguishes_command());
+        let dead = library.effect("actuator_deadzone").unwrap();
+        assert!(!dead.distinguishes_command() && !dead.limits_command());
+    }
+
+    #[test]
     fn an_effect_with_a_direction_is_not_mirror_symmetric() {
         let library = Library::built_in();
         let has = |name: &str| library.effect(name).unwrap().is_mirror_symmetric();

@@ -239,6 +239,15 @@ mod tests {
     }
 
     #[test]
+    fn a_library_without_limits_has_all_other_effects() {
+        let whole = Library::built_in();
+        let without = whole.without_limits();
+        assert_eq!(without.effects().len(), whole.effects().len() - 2);
+        assert!(without.effect("actuator_saturation").is_err());
+        assert!(without.effect("actuator_gain").is_ok());
+    }
+
+    #[test]
     fn every_embedded_file_is_valid() {
         let library = Library::built_in();
         assert!(library.effects().len() >= 13);

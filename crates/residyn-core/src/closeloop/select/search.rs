@@ -152,35 +152,49 @@ impl<'a> Search<'a> {
             if self.watch.has_to_end() {
                 break;
             }
-            let Some(next) = self.next(&best) else {
+            let Some(next) = self.next(&best, &passed)? else {
                 break;
             };
-            best = self.estimated(next)?;
-            if passed.contains(&best.key()) {
-                break;
-            }
-            passed.push(best.key());
+            passed.push(next.key());
+            best = next;
         }
         Ok(best)
     }
 
     /// The best set with effects added or, if the gain is not large, with one exchanged: an effect added to a wrong one
-    /// may do little more than correct that effect's error.
-    fn next(&mut self, best: &Trial) -> Option<Trial> {
+    /// may do little more than correct that effect's error. A set that turns out to be a passed one, estimated anew, is not
+    /// taken: an effect that was exchanged for one that contains it may come back.
+    ///
+    /// # Errors
+    /// If a better set cannot be fitted again.
+    fn next(&mut self, best: &Trial, passed: &[Vec<EffectId>]) -> Result<Option<Trial>, FitError> {
         let settings = &self.problem.settings.select;
         let added = self.better(best, settings.round_gain, Self::round);
         let is_large =
             |better: &Better| better.trial.loss() < best.loss() * (1.0 - settings.large_gain);
-        if added.as_ref().is_some_and(is_large) {
-            self.rejected.clear();
-            return added.map(|added| self.choose(added));
-        }
         // An exchange adds nothing, so it goes first, and a smaller gain will do.
-        if let Some(exchanged) = self.better(best, settings.exchange_gain, Self::exchanged) {
-            return Some(self.choose(exchanged));
+        if !added.as_ref().is_some_and(is_large)
+            && let Some(exchanged) = self.better(best, settings.exchange_gain, Self::exchanged)
+            && let Some(next) = self.taken(exchanged, passed)?
+        {
+            return Ok(Some(next));
         }
         self.rejected.clear();
-        added.map(|added| self.choose(added))
+        added.map_or(Ok(None), |added| self.taken(added, passed))
+    }
+
+    /// A trial that a round found, estimated anew and noted as chosen, unless it is one that was passed.
+    fn taken(
+        &mut self,
+        better: Better,
+        passed: &[Vec<EffectId>],
+    ) -> Result<Option<Trial>, FitError> {
+        let trial = self.estimated(better.trial.clone())?;
+        if passed.contains(&trial.key()) {
+            return Ok(None);
+        }
+        self.choose(better);
+        Ok(Some(trial))
     }
 
     /// A trial with its scale estimated anew: the residuals have fallen, and smaller effects show. It keeps its present
