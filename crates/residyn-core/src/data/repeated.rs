@@ -22,7 +22,8 @@ const EVEN: [f64; 2] = [0.5, 1.5];
 /// A reading that stays for more rows is a frozen sensor: how the joint moved meanwhile is unknown.
 const MOST_ROWS: usize = 10;
 
-/// With a larger share of repeated rows in motion, the log is written faster than its source is read: another finding.
+/// With a larger share of repeated rows in motion, the log is written faster than its source is read: another finding. A
+/// channel that keeps its value in a larger share of the rows does so by itself.
 const MANY: f64 = 0.2;
 
 /// The gain of white noise's variance in third differences.
@@ -30,7 +31,7 @@ const THIRD_GAIN: f64 = 20.0;
 
 impl Log {
     /// The log with repeated readings masked and interpolated between the fresh ones, and the rows that repeat. What
-    /// drives the joints is left as it is: commands come from the computer, not over the bus.
+    /// drives the joints is left as it is, if it came from the computer, not with the readings.
     pub(super) fn without_repeats(&self) -> (Cow<'_, Log>, Vec<usize>) {
         let fresh = fresh_rows(self);
         let rows = repeated_rows(self, &fresh);
@@ -43,8 +44,11 @@ impl Log {
             let around = [next - 2, next - 1, next, next + 1].map(|at| fresh[at]);
             interpolated(&self.time, channel, around, self.time[row])
         };
-        let channels = log.q.iter_mut().chain(&mut log.qd);
-        for (new, old) in channels.zip(self.q.iter().chain(&self.qd)) {
+        let readings = log.q.iter_mut().chain(&mut log.qd);
+        let readings = readings.zip(self.q.iter().chain(&self.qd));
+        let driving = log.tau.iter_mut().zip(&self.tau);
+        let driving = driving.filter(|(_, old)| came_with_readings(old, &rows, &fresh));
+        for (new, old) in readings.chain(driving) {
             // A velocity from another source may be fresh.
             for &row in rows.iter().filter(|row| old[**row] == old[**row - 1]) {
                 new[row] = between(old, row);
@@ -58,6 +62,14 @@ impl Log {
         }
         (Cow::Owned(log), rows)
     }
+}
+
+/// Whether what drives a joint was logged with the readings: it keeps its value where they repeat, and nowhere else. The whole
+/// row is an old one then.
+fn came_with_readings(channel: &[f64], repeated: &[usize], fresh: &[usize]) -> bool {
+    let keeps = |row: &&usize| **row > 0 && channel[**row] == channel[**row - 1];
+    let share = |rows: &[usize]| rows.iter().filter(keeps).count() as f64 / rows.len() as f64;
+    share(repeated) > 1.0 - MANY && share(fresh) < MANY
 }
 
 /// The rows in which the angle of any joint differs from the row before.
@@ -159,6 +171,29 @@ mod tests {
             assert!((mended.q[0][row] - exact.q[0][row]).abs() < 3e-4, "{row}");
             assert!((mended.qd[0][row] - exact.qd[0][row]).abs() < 1e-3, "{row}");
         }
+    }
+
+    #[test]
+    fn a_command_that_was_logged_with_the_readings_repeats_with_them() {
+        let exact = swing(1e-4);
+        let repeat = |channel: &mut Vec<f64>| {
+            for row in REPEATED {
+                channel[row] = channel[row - 1];
+            }
+        };
+        let mut log = exact.clone();
+        [&mut log.q[0], &mut log.qd[0], &mut log.tau[0]].map(repeat);
+        let (mended, _) = log.without_repeats();
+        for row in REPEATED {
+            let is_near = (mended.tau[0][row] - exact.tau[0][row]).abs() < 1e-12;
+            assert!(is_near, "{row}");
+        }
+        // A command that changes every other row may have been held.
+        for row in 0..1000 {
+            log.tau[0][row] = log.time[row - row % 2];
+        }
+        repeat(&mut log.tau[0]);
+        assert_eq!(log.without_repeats().0.tau, log.tau);
     }
 
     #[test]
