@@ -182,7 +182,9 @@ mod tests {
             }
         };
         let mut log = exact.clone();
-        [&mut log.q[0], &mut log.qd[0], &mut log.tau[0]].map(repeat);
+        for channel in [&mut log.q[0], &mut log.qd[0], &mut log.tau[0]] {
+            repeat(channel);
+        }
         let (mended, _) = log.without_repeats();
         for row in REPEATED {
             let is_near = (mended.tau[0][row] - exact.tau[0][row]).abs() < 1e-12;

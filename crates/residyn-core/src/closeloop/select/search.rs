@@ -155,18 +155,21 @@ impl<'a> Search<'a> {
             let Some(next) = self.next(&best, &passed)? else {
                 break;
             };
-            passed.push(next.key());
             best = next;
+            if passed.contains(&best.key()) {
+                break;
+            }
+            passed.push(best.key());
         }
         Ok(best)
     }
 
     /// The best set with effects added or, if the gain is not large, with one exchanged: an effect added to a wrong one
-    /// may do little more than correct that effect's error. A set that turns out to be a passed one, estimated anew, is not
-    /// taken: an effect that was exchanged for one that contains it may come back.
+    /// may do little more than correct that effect's error. An exchange that turns out to lead back to a `passed` set,
+    /// estimated anew, does not stand in the way of an effect to add.
     ///
     /// # Errors
-    /// If a better set cannot be fitted again.
+    /// If the set cannot be fitted again.
     fn next(&mut self, best: &Trial, passed: &[Vec<EffectId>]) -> Result<Option<Trial>, FitError> {
         let settings = &self.problem.settings.select;
         let added = self.better(best, settings.round_gain, Self::round);
@@ -175,26 +178,16 @@ impl<'a> Search<'a> {
         // An exchange adds nothing, so it goes first, and a smaller gain will do.
         if !added.as_ref().is_some_and(is_large)
             && let Some(exchanged) = self.better(best, settings.exchange_gain, Self::exchanged)
-            && let Some(next) = self.taken(exchanged, passed)?
         {
-            return Ok(Some(next));
+            let next = self.estimated(exchanged.trial.clone())?;
+            if added.is_none() || !passed.contains(&next.key()) {
+                self.choose(exchanged);
+                return Ok(Some(next));
+            }
         }
         self.rejected.clear();
-        added.map_or(Ok(None), |added| self.taken(added, passed))
-    }
-
-    /// A trial that a round found, estimated anew and noted as chosen, unless it is one that was passed.
-    fn taken(
-        &mut self,
-        better: Better,
-        passed: &[Vec<EffectId>],
-    ) -> Result<Option<Trial>, FitError> {
-        let trial = self.estimated(better.trial.clone())?;
-        if passed.contains(&trial.key()) {
-            return Ok(None);
-        }
-        self.choose(better);
-        Ok(Some(trial))
+        let added = added.map(|added| self.choose(added));
+        added.map(|added| self.estimated(added)).transpose()
     }
 
     /// A trial with its scale estimated anew: the residuals have fallen, and smaller effects show. It keeps its present
