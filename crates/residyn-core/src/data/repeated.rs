@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::column::Quantity;
 use super::examined::at_examined;
 use super::jumps::interpolated;
 use super::log::Log;
@@ -30,8 +31,9 @@ const MANY: f64 = 0.2;
 const THIRD_GAIN: f64 = 20.0;
 
 impl Log {
-    /// The log with repeated readings masked and interpolated between the fresh ones, and the rows that repeat. What
-    /// drives the joints is left as it is, if it came from the computer, not with the readings.
+    /// The log with repeated readings masked and interpolated between the fresh ones, and the rows that repeat. Commands
+    /// are left as they are, if they came from the computer, not with the readings; so are torques, which noise changes
+    /// as much from row to row as an old one is off.
     pub(super) fn without_repeats(&self) -> (Cow<'_, Log>, Vec<usize>) {
         let fresh = fresh_rows(self);
         let rows = repeated_rows(self, &fresh);
@@ -46,9 +48,11 @@ impl Log {
         };
         let readings = log.q.iter_mut().chain(&mut log.qd);
         let readings = readings.zip(self.q.iter().chain(&self.qd));
-        let driving = log.tau.iter_mut().zip(&self.tau);
-        let driving = driving.filter(|(_, old)| came_with_readings(old, &rows, &fresh));
-        for (new, old) in readings.chain(driving) {
+        let is_command = self.driven_by == Quantity::Command;
+        let commands = log.tau.iter_mut().zip(&self.tau);
+        let commands =
+            commands.filter(|(_, old)| is_command && came_with_readings(old, &rows, &fresh));
+        for (new, old) in readings.chain(commands) {
             // A velocity from another source may be fresh.
             for &row in rows.iter().filter(|row| old[**row] == old[**row - 1]) {
                 new[row] = between(old, row);
@@ -64,7 +68,7 @@ impl Log {
     }
 }
 
-/// Whether what drives a joint was logged with the readings: it keeps its value where they repeat, and nowhere else. The whole
+/// Whether a command was logged with the readings: it keeps its value where they repeat, and nowhere else. The whole
 /// row is an old one then.
 fn came_with_readings(channel: &[f64], repeated: &[usize], fresh: &[usize]) -> bool {
     let keeps = |row: &&usize| **row > 0 && channel[**row] == channel[**row - 1];
@@ -175,7 +179,10 @@ mod tests {
 
     #[test]
     fn a_command_that_was_logged_with_the_readings_repeats_with_them() {
-        let exact = swing(1e-4);
+        let exact = Log {
+            driven_by: Quantity::Command,
+            ..swing(1e-4)
+        };
         let repeat = |channel: &mut Vec<f64>| {
             for row in REPEATED {
                 channel[row] = channel[row - 1];
