@@ -13,7 +13,7 @@ use super::fitted::Fitted;
 use super::limbs::Limb;
 use super::problem::Problem;
 use super::refine::{Refined, with_intervals};
-use crate::data::{Quantity, of_joints};
+use crate::data::{Joint, Quantity, of_joints};
 use crate::identify::{FitError, LevenbergMarquardt, Window, uncertainty};
 use crate::model::Model;
 use crate::sim::metric::errors_in;
@@ -183,6 +183,13 @@ fn parted(windows: &[Window], part: usize) -> (Vec<Window>, Vec<Window>) {
 pub(super) fn estimate(problem: &Problem<'_>, model: &Model) -> Result<Fitted, FitError> {
     let start_states = problem.shooting.initial_start_states(0);
     problem.refit(model, start_states, None)
+}
+
+/// The loss of the motion under the commands, after a short fit of a model to it.
+pub(super) fn loss_of_motion(problem: &Problem<'_>, model: &Model) -> Option<f64> {
+    let limb = Limb::of(problem, &[], Joint::all(problem.declared.joints).collect());
+    let trial = Comparison::of(problem, &limb).short(model);
+    estimate(&trial, model).ok().map(|fitted| fitted.loss())
 }
 
 /// Sums of the squared position errors in these windows, one per joint.

@@ -6,15 +6,14 @@
 
 use rand::Rng;
 
-use super::by_motion::{Comparison, estimate};
+use super::by_motion::{estimate, loss_of_motion};
 use super::drive_limits;
 use super::error::StudyError;
 use super::fit::Declared;
-use super::limbs::Limb;
 use super::problem::Problem;
 use super::searched::Searched;
 use super::stage::Watch;
-use crate::data::{Joint, Log};
+use crate::data::Log;
 use crate::model::{AlikeOn, Effect, FittedEffect, Library, Model};
 
 /// As [`drive_limits::searched`], with the filter of commands that the motion asks for.
@@ -96,21 +95,11 @@ fn filtered_by(filter: &Effect, problem: &Problem<'_>, model: &Model) -> Option<
 
 /// Whether commands were found to be filtered, but not as one bus to all drives does.
 fn is_in_doubt(searched: &Searched<'_>) -> bool {
-    let Declared { problem, .. } = &searched.declared;
-    let model = &searched.chosen.after.model;
-    let added = &model.effects[problem.added(model)];
-    let filters: Vec<&FittedEffect> = added
-        .iter()
+    let filters: Vec<&FittedEffect> = (searched.added().iter())
         .filter(|added| added.effect.is_filter())
         .collect();
     let is_of_bus = |filter: &&FittedEffect| filter.effect.alike_on == AlikeOn::Commanded;
-    let is_of_one_bus = filters.len() == problem.declared.joints && filters.iter().all(is_of_bus);
+    let is_of_one_bus =
+        filters.len() == searched.declared.problem.declared.joints && filters.iter().all(is_of_bus);
     !filters.is_empty() && !is_of_one_bus
-}
-
-/// The loss of the motion under the commands, after a short fit of a model to it.
-pub(super) fn loss_of_motion(problem: &Problem<'_>, model: &Model) -> Option<f64> {
-    let limb = Limb::of(problem, &[], Joint::all(problem.declared.joints).collect());
-    let trial = Comparison::of(problem, &limb).short(model);
-    estimate(&trial, model).ok().map(|fitted| fitted.loss())
 }

@@ -7,13 +7,12 @@
 
 use rand::Rng;
 
-use super::command_path::loss_of_motion;
+use super::by_motion::loss_of_motion;
 use super::error::StudyError;
 use super::fit::Declared;
 use super::searched::Searched;
 use super::stage::Watch;
 use crate::data::Log;
-use crate::model::FittedEffect;
 
 /// As [`Searched::by`], with limits only if the motion asks for them.
 ///
@@ -36,11 +35,6 @@ pub(super) fn searched<'a>(
 }
 
 impl Searched<'_> {
-    fn added(&self) -> &[FittedEffect] {
-        let model = &self.chosen.after.model;
-        &model.effects[self.declared.problem.added(model)]
-    }
-
     fn has_limits(&self) -> bool {
         let mut added = self.added().iter();
         added.any(|added| added.effect.limits_command())

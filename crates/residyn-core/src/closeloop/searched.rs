@@ -14,6 +14,7 @@ use super::plainer::{Plainer, Unused, plainer};
 use super::select::{Selected, Trial, select, select_beginning_with, select_from};
 use super::stage::{Stage, Watch};
 use crate::data::Log;
+use crate::model::FittedEffect;
 
 /// A search for effects, and the fit that it began with.
 pub(super) struct Searched<'a> {
@@ -66,6 +67,12 @@ impl<'a> Searched<'a> {
         let mut best = Self::beginning_with(Some(first), declared, watch);
         best.left = Some(best.diagnose(rng));
         best.plainest(apart, watch)
+    }
+
+    /// The effects of the chosen model beyond the declared ones.
+    pub fn added(&self) -> &[FittedEffect] {
+        let model = &self.chosen.after.model;
+        &model.effects[self.declared.problem.added(model)]
     }
 
     /// Plainer models in place of the chosen one, as long as they predict whole logs better.

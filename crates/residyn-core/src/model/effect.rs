@@ -371,9 +371,7 @@ impl Effect {
     /// A force that depends on the command may cancel it.
     pub fn distinguishes_command(&self) -> bool {
         match &self.entry {
-            Entry::Torque(formula) => {
-                (self.acting(formula, COMMANDS)).is_sorted_by(|less, more| less < more)
-            }
+            Entry::Torque(formula) => grows(&self.acting(formula)),
             Entry::Force(formula) => !formula.names().contains(&"tau"),
             _ => true,
         }
@@ -385,19 +383,19 @@ impl Effect {
         let Entry::Torque(formula) = &self.entry else {
             return false;
         };
-        let grows = (self.acting(formula, 1)).is_sorted_by(|less, more| less < more);
-        let all = self.acting(formula, COMMANDS);
-        grows && all.is_sorted() && !self.distinguishes_command()
+        let acting = self.acting(formula);
+        let small = &acting[acting.len() / 2 - 1..][..3];
+        grows(small) && acting.is_sorted() && !grows(&acting)
     }
 
-    /// The torques that act under so many commands on either side of zero, at typical values.
-    fn acting(&self, formula: &Formula, commands: i32) -> Vec<f64> {
+    /// The torques that act under commands on either side of zero, at typical values.
+    fn acting(&self, formula: &Formula) -> Vec<f64> {
         let values: Vec<f64> = self.parameters.iter().map(|p| p.typical).collect();
         let acting = |tau: f64| {
             let at = |name: &str| if name == "tau" { tau } else { 0.0 };
             self.evaluate(formula, &values, at)
         };
-        let commands = (-commands..=commands).map(|k| f64::from(k) * COMMAND_STEP);
+        let commands = (-COMMANDS..=COMMANDS).map(|k| f64::from(k) * COMMAND_STEP);
         commands.map(acting).collect()
     }
 
@@ -442,6 +440,11 @@ impl EffectParameter {
     pub fn is_switch(&self) -> bool {
         self.starts == [0.0]
     }
+}
+
+/// Whether each torque is larger than the one before.
+fn grows(torques: &[f64]) -> bool {
+    torques.is_sorted_by(|less, more| less < more)
 }
 
 #[cfg(test)]
