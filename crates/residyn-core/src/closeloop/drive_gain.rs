@@ -55,7 +55,7 @@ fn common_factor(declared: &[Parameter], fitted: &[Parameter]) -> Option<(f64, V
 }
 
 /// Whether a value in this unit is in proportion to the torques that it explains: a mass, an inertia, a friction.
-fn is_of_torque(unit: &str) -> bool {
+pub(super) fn is_of_torque(unit: &str) -> bool {
     let mass = BASE.iter().position(|base| *base == "kg");
     let exponents = Unit::parse(unit).map(Unit::exponents);
     exponents.zip(mass).is_some_and(|(all, kg)| all[kg] == 1)

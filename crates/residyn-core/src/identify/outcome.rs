@@ -80,6 +80,14 @@ impl Fit {
         all
     }
 
+    /// The prior of the declared values, with its cost.
+    pub fn declared_values(&self) -> WindowTerms {
+        WindowTerms {
+            cost: self.prior_cost,
+            ..self.prior.clone()
+        }
+    }
+
     /// Information on the free values: that of the logs and, of bodies, that of their declaration.
     pub fn information(&self) -> DMatrix<f64> {
         self.equations().hessian + &self.bodies.hessian

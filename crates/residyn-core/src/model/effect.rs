@@ -21,6 +21,12 @@ pub(super) const PLACE: [&str; 3] = ["x", "y", "z"];
 /// N): typical values are for desktop rigs.
 const COMMANDS: i32 = 60;
 const COMMAND_STEP: f64 = 0.05;
+/// Torques that differ by less than this share of a unit command are the same.
+const PROPORTIONAL: f64 = 1e-9;
+
+fn commands() -> impl Iterator<Item = f64> {
+    (-COMMANDS..=COMMANDS).map(|k| f64::from(k) * COMMAND_STEP)
+}
 
 /// Angle, speed, torque and load at which an effect is compared with its mirror image.
 const MIRRORED: [[f64; 4]; 3] = [
@@ -371,7 +377,7 @@ impl Effect {
     /// A force that depends on the command may cancel it.
     pub fn distinguishes_command(&self) -> bool {
         match &self.entry {
-            Entry::Torque(formula) => grows(&self.acting(formula)),
+            Entry::Torque(formula) => grows(&self.acting(formula, &self.typical())),
             Entry::Force(formula) => !formula.names().contains(&"tau"),
             _ => true,
         }
@@ -383,20 +389,35 @@ impl Effect {
         let Entry::Torque(formula) = &self.entry else {
             return false;
         };
-        let acting = self.acting(formula);
+        let acting = self.acting(formula, &self.typical());
         let small = &acting[acting.len() / 2 - 1..][..3];
         grows(small) && acting.is_sorted() && !grows(&acting)
     }
 
-    /// The torques that act under commands on either side of zero, at typical values.
-    fn acting(&self, formula: &Formula) -> Vec<f64> {
-        let values: Vec<f64> = self.parameters.iter().map(|p| p.typical).collect();
+    /// By what these values multiply every command, if the acting torque is in proportion to it: that of a gain.
+    pub fn gain(&self, values: &[f64]) -> Option<f64> {
+        let Entry::Torque(formula) = &self.entry else {
+            return None;
+        };
+        let acting = self.acting(formula, values);
+        let gain = acting.last()? / commands().last()?;
+        let mut pairs = acting.iter().zip(commands());
+        let is_in_proportion = pairs
+            .all(|(acting, command)| (acting - gain * command).abs() <= PROPORTIONAL * gain.abs());
+        is_in_proportion.then_some(gain)
+    }
+
+    fn typical(&self) -> Vec<f64> {
+        self.parameters.iter().map(|p| p.typical).collect()
+    }
+
+    /// The torques that act under commands on either side of zero.
+    fn acting(&self, formula: &Formula, values: &[f64]) -> Vec<f64> {
         let acting = |tau: f64| {
             let at = |name: &str| if name == "tau" { tau } else { 0.0 };
-            self.evaluate(formula, &values, at)
+            self.evaluate(formula, values, at)
         };
-        let commands = (-COMMANDS..=COMMANDS).map(|k| f64::from(k) * COMMAND_STEP);
-        commands.map(acting).collect()
+        commands().map(acting).collect()
     }
 
     /// Whether the effect acts alike on a joint and on its mirror image: with the joint's axis turned round, the same values of

@@ -11,6 +11,7 @@ mod knowledge;
 mod losses;
 mod open_loop_check;
 mod rivals;
+mod scale;
 mod screen;
 mod screening;
 mod search;

@@ -32,6 +32,8 @@ pub struct Screening {
     blocks: Vec<WindowTerms>,
     groups: Vec<WindowTerms>,
     all: WindowTerms,
+    /// What the declared values say.
+    declared: WindowTerms,
     knowledge: Knowledge,
     /// From the settings.
     kept_information: f64,
@@ -105,6 +107,7 @@ impl Screening {
             blocks,
             groups,
             all: fit.equations_and_prior(),
+            declared: fit.declared_values(),
             knowledge: Knowledge::of(problem, &model, &fit),
             kept_information: problem.settings.select.kept_information,
         })
@@ -138,13 +141,14 @@ impl Screening {
             there
         };
         let steps: Vec<DVector<f64>> = self.groups.iter().map(without).collect();
-        let loss = |(part, &group): (&WindowTerms, &usize)| {
-            let step = &steps[group];
+        let loss = |part: &WindowTerms, step: &DVector<f64>| {
             let gradient = part.gradient.select_rows(&rows);
             let hessian = submatrix(&part.hessian, &rows, &rows);
             predicted(part.cost, &gradient, &hessian, step)
         };
-        Some(self.blocks.iter().zip(&self.groups_of).map(loss).sum())
+        let blocks = self.blocks.iter().zip(&self.groups_of);
+        let of_logs: f64 = blocks.map(|(part, &group)| loss(part, &steps[group])).sum();
+        Some(of_logs + loss(&self.declared, &at))
     }
 
     /// Which values of a set are free at the minimum of the loss, and the values of the others.

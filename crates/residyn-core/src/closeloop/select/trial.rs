@@ -1,4 +1,3 @@
-use super::evidence::gain;
 use super::identity::EffectId;
 use super::knowledge::Knowledge;
 use super::losses::Losses;
@@ -16,6 +15,9 @@ pub struct Trial {
     /// The loss on each block, with the parameters that a fit without the block would give; comparable among trials
     /// fitted at the same scale.
     pub losses: Losses,
+    /// What the declared values say against those of the model, in the unit of the losses: of sets that explain the logs
+    /// alike, the one that leaves the rig as it is drawn is the likelier.
+    prior: f64,
     /// Identifies the model's effects, in their order.
     ids: Vec<EffectId>,
 }
@@ -25,6 +27,7 @@ impl Trial {
         let effects = fitted.model.effects.iter();
         Self {
             losses: Losses::of(problem, &fitted),
+            prior: fitted.fit.prior_cost,
             ids: effects.map(|effect| problem.id(effect)).collect(),
             fitted,
         }
@@ -45,9 +48,9 @@ impl Trial {
         }
     }
 
-    /// Loss over all blocks.
+    /// Loss over all blocks, and by the declared values.
     pub fn loss(&self) -> f64 {
-        self.losses.total()
+        self.losses.total() + self.prior
     }
 
     /// Number of free values, and of simpler effects that the effects of the model contain.
@@ -108,16 +111,23 @@ impl Trial {
     /// Whether this simpler set explains the logs as well as the best one: its loss is at most a little larger, and not
     /// significantly so, in total and on each joint where the two differ.
     pub fn is_as_good_as(&self, best: &Self, settings: &SelectSettings) -> bool {
-        let is_as_good = |own: &[f64], best: &[f64]| {
-            let rise = -gain(best, own);
+        // `by_prior` is what the declared values add to the difference.
+        let is_as_good = |own: &[f64], best: &[f64], by_prior: f64| {
             let differences = differences(own, best);
-            let within = mean(&differences)
-                <= settings.simpler_standard_errors * standard_error(&differences);
+            let more = mean(&differences) + by_prior / own.len() as f64;
+            let rise = more / mean(best).max(f64::MIN_POSITIVE);
+            let within = more <= settings.simpler_standard_errors * standard_error(&differences);
             rise < settings.negligible_rise || within && rise < settings.simpler_rise
         };
-        let on_joint =
-            |joint: Joint| is_as_good(&self.losses.of_joint(joint), &best.losses.of_joint(joint));
-        is_as_good(&self.losses.values, &best.losses.values)
+        let on_joint = |joint: Joint| {
+            is_as_good(
+                &self.losses.of_joint(joint),
+                &best.losses.of_joint(joint),
+                0.0,
+            )
+        };
+        let by_prior = self.prior - best.prior;
+        is_as_good(&self.losses.values, &best.losses.values, by_prior)
             && self.differs_on(best).into_iter().all(on_joint)
     }
 
