@@ -156,7 +156,7 @@ pub(super) fn standings(
         let of_joint = |losses: &Losses| losses.of_effect(&effect);
         let (crossed_less, with) = (of_joint(&crossed(less)), of_joint(&with));
         let evidence = Evidence {
-            gain: gain(&of_joint(&less.losses), &of_joint(&chosen.losses)),
+            gain: chosen.gain_over(less, &effect),
             p_of_values: p_value_by(&known, problem, &chosen.fitted, k),
             p_of_falls: p_of_gains(&crossed_less, &with),
             crossed_gain: gain(&crossed_less, &with),

@@ -12,6 +12,7 @@ use super::fitted::Fitted;
 use super::gravity::{against_gravity, shares_of_gravity};
 use super::loss::Loss;
 use super::one_way::moves_one_way;
+use super::payload::p_of_departure;
 use super::problem::Problem;
 use super::refine::Refined;
 use super::select::p_value;
@@ -145,11 +146,15 @@ impl Chosen {
         });
     }
 
-    /// Effects are not established if the torques of some log fit as well without them.
+    /// Effects are not established if the torques of some log fit as well without them, unless bodies that contradict the
+    /// declared ones would take their place.
     fn ask_every_log(&mut self, problem: &Problem<'_>, apart: &[Log]) {
         let logs = EveryLog::of(problem, problem.logs.iter().chain(apart), &self.after);
+        let (level, own) = (problem.settings.establish.false_alarm, &self.after);
         demote(&mut self.standings, |standing| {
-            let log = logs.fits_as_well_without(standing)?;
+            let without = standing.without.as_ref().ok()?;
+            let is_drawn = problem.is_by_law() && departs_from(own, without) < level;
+            let log = logs.fits_as_well_without(standing).filter(|_| !is_drawn)?;
             Some(format!(
                 "the torques of {} fit as well without it",
                 log.name()
@@ -206,6 +211,11 @@ impl Chosen {
         mark(&mut refined.after.model, &self.standings);
         mark(&mut self.after.model, &self.standings);
     }
+}
+
+/// The probability that the declared values are off by so much more without an effect than with it.
+fn departs_from(with: &Fitted, without: &Fitted) -> f64 {
+    p_of_departure(2.0 * (without.fit.prior_cost - with.fit.prior_cost), 1)
 }
 
 fn depends_on_angle(effect: &FittedEffect) -> bool {

@@ -43,7 +43,7 @@ impl Problem<'_> {
         let with = fits.min_by(|a, b| whole(&a.fit).total_cmp(&whole(&b.fit)))?;
         let saved = whole(&chosen.fit) - whole(&with.fit);
         let settings = &self.settings.establish;
-        let p_value = p_of(2.0 * saved, effect.parameters.len());
+        let p_value = p_of_departure(2.0 * saved, effect.parameters.len());
         let is_clear = saved > settings.payload_share * chosen.fit.prior_cost
             && p_value < settings.false_alarm;
         let effect = with.model.effects.last()?.clone();
@@ -88,8 +88,9 @@ impl Problem<'_> {
     }
 }
 
-/// The probability that twice the cost falls this much by chance, if the declared bodies are off as they usually are.
-fn p_of(twice: f64, values: usize) -> f64 {
+/// The probability that twice the cost falls this much by chance with so many more values, if the declared bodies are off as
+/// they usually are.
+pub(super) fn p_of_departure(twice: f64, values: usize) -> f64 {
     let by_chance = ChiSquared::new(values as f64).expect("there are values");
     1.0 - by_chance.cdf(twice.max(0.0))
 }

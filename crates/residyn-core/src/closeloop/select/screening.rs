@@ -32,8 +32,8 @@ pub struct Screening {
     blocks: Vec<WindowTerms>,
     groups: Vec<WindowTerms>,
     all: WindowTerms,
-    /// What the declared values say.
-    declared: WindowTerms,
+    /// What the declared values say, where they count as in a [`Trial`](super::Trial).
+    declared: Option<WindowTerms>,
     knowledge: Knowledge,
     /// From the settings.
     kept_information: f64,
@@ -107,7 +107,7 @@ impl Screening {
             blocks,
             groups,
             all: fit.equations_and_prior(),
-            declared: fit.declared_values(),
+            declared: problem.is_by_law().then(|| fit.declared_values()),
             knowledge: Knowledge::of(problem, &model, &fit),
             kept_information: problem.settings.select.kept_information,
         })
@@ -148,7 +148,8 @@ impl Screening {
         };
         let blocks = self.blocks.iter().zip(&self.groups_of);
         let of_logs: f64 = blocks.map(|(part, &group)| loss(part, &steps[group])).sum();
-        Some(of_logs + loss(&self.declared, &at))
+        let declared = self.declared.as_ref();
+        Some(of_logs + declared.map_or(0.0, |declared| loss(declared, &at)))
     }
 
     /// Which values of a set are free at the minimum of the loss, and the values of the others.

@@ -15,8 +15,9 @@ pub struct Trial {
     /// The loss on each block, with the parameters that a fit without the block would give; comparable among trials
     /// fitted at the same scale.
     pub losses: Losses,
-    /// What the declared values say against those of the model, in the unit of the losses: of sets that explain the logs
-    /// alike, the one that leaves the rig as it is drawn is the likelier.
+    /// What the declared values say against those of the model, in the unit of the losses, if torques follow from the law
+    /// of drives. Only they tell the scale of forces then: of sets that explain the logs alike, the one that leaves the rig
+    /// as it is drawn is the likelier.
     prior: f64,
     /// Identifies the model's effects, in their order.
     ids: Vec<EffectId>,
@@ -27,7 +28,10 @@ impl Trial {
         let effects = fitted.model.effects.iter();
         Self {
             losses: Losses::of(problem, &fitted),
-            prior: fitted.fit.prior_cost,
+            prior: match problem.is_by_law() {
+                true => fitted.fit.prior_cost,
+                false => 0.0,
+            },
             ids: effects.map(|effect| problem.id(effect)).collect(),
             fitted,
         }
@@ -51,6 +55,16 @@ impl Trial {
     /// Loss over all blocks, and by the declared values.
     pub fn loss(&self) -> f64 {
         self.losses.total() + self.prior
+    }
+
+    /// The loss on the joints of an effect, and by the declared values, as a share of that of the trial without the effect:
+    /// by how much it falls.
+    pub fn gain_over(&self, without: &Self, effect: &FittedEffect) -> f64 {
+        let loss = |of: &Self| of.losses.of_effect(effect).iter().sum::<f64>() + of.prior;
+        // What all models leave of the declared values is no loss of the effect's.
+        let common = self.prior.min(without.prior);
+        let [with, without] = [self, without].map(|of| loss(of) - common);
+        1.0 - with / without.max(f64::MIN_POSITIVE)
     }
 
     /// Number of free values, and of simpler effects that the effects of the model contain.
