@@ -136,28 +136,45 @@ impl<'a> Part<'a> {
         let before = Trial::of(&declared.problem, chosen.after.clone());
         let (mut trial, mut unused) = (before.clone(), Vec::new());
         for (usual, effect) in &self.own(all) {
-            let present = &trial.fitted.model.effects;
-            if present.iter().any(|present| present.excludes(effect)) {
-                continue;
-            }
             let is_free =
                 |other: &FittedEffect| usual.replaces(&other.on(self.joints[other.joint]), all);
-            if let Some((better, other)) = self.exchanged(&trial, effect, is_free) {
+            while let Some((better, other)) = self.instead(&trial, effect, is_free) {
                 let name = &effect.effect.name;
                 unused.push(Unused {
                     effect: Some(other),
                     why: format!("{name}, which like joints have, explains the logs as well"),
                 });
                 trial = better;
-            } else if let Some(better) = self.with(&trial, effect) {
-                trial = better;
+            }
+            if !self.is_filtered(&trial, (usual, effect), all) {
+                trial = self.with(&trial, effect).unwrap_or(trial);
             }
         }
         (trial.key() != before.key()).then(|| self.searched.with(trial, unused, watch))
     }
 
-    /// The trial with a usual effect in place of a free one on its joint, and that one, if the logs do not tell them apart.
-    fn exchanged(
+    /// Whether a trial has another filter of the same joint's commands that more joints have: beside it, the torques of a
+    /// law show any filter.
+    fn is_filtered(
+        &self,
+        trial: &Trial,
+        (usual, effect): (&Usual, &FittedEffect),
+        all: &[Usual],
+    ) -> bool {
+        let is_other = |own: &FittedEffect| {
+            let mut of_more = all
+                .iter()
+                .filter(|other| other.joints.len() > usual.joints.len());
+            own.joint == effect.joint
+                && own.effect.is_filter()
+                && of_more.any(|other| other.is_of(&own.on(self.joints[own.joint])))
+        };
+        effect.effect.is_filter() && trial.fitted.model.effects.iter().any(is_other)
+    }
+
+    /// The trial with a usual effect, which it may have already, in place of a free one on its joint, and that one, if the
+    /// logs do not tell them apart.
+    fn instead(
         &self,
         trial: &Trial,
         effect: &FittedEffect,
@@ -166,27 +183,32 @@ impl<'a> Part<'a> {
         let problem = &self.searched.declared.problem;
         let settings = &problem.settings.select;
         let model = &trial.fitted.model;
-        let exchanged = |k: usize| {
+        let without = |k: usize| {
             let other = &model.effects[k];
             if other.joint != effect.joint || !is_free(other) {
                 return None;
             }
             let mut effects = model.effects.clone();
-            effects[k] = effect.clone();
+            effects.remove(k);
+            if !effects.iter().any(|present| present.excludes(effect)) {
+                effects.insert(k, effect.clone());
+            }
             let below = trial.loss() * (1.0 + settings.simpler_rise);
             let fitted = problem.with_better_effects(&trial.fitted, effects, below)?;
             let found = Trial::of(problem, fitted);
             let is_as_good = found.is_valid(problem) && found.is_as_good_as(trial, settings);
             is_as_good.then(|| (found, other.clone()))
         };
-        problem.added(model).find_map(exchanged)
+        problem.added(model).find_map(without)
     }
 
     /// The trial with a usual effect in addition, if the logs show it.
     fn with(&self, trial: &Trial, effect: &FittedEffect) -> Option<Trial> {
         let problem = &self.searched.declared.problem;
         let model = &trial.fitted.model;
-        if model.effects.iter().any(|present| present.contains(effect)) {
+        let is_there =
+            |present: &FittedEffect| present.excludes(effect) || present.contains(effect);
+        if model.effects.iter().any(is_there) {
             return None;
         }
         let effects = [model.effects.as_slice(), std::slice::from_ref(effect)].concat();
