@@ -514,6 +514,15 @@ mod tests {
     }
 
     #[test]
+    fn a_gain_is_in_proportion_to_the_command() {
+        let library = Library::built_in();
+        let gain = |name: &str, values: &[f64]| library.effect(name).unwrap().gain(values);
+        assert!((gain("actuator_gain", &[-0.4]).unwrap() - 0.6).abs() < 1e-12);
+        assert_eq!(gain("actuator_saturation", &[1.0]), None);
+        assert_eq!(gain("viscous_friction", &[1.0]), None);
+    }
+
+    #[test]
     fn an_effect_with_a_direction_is_not_mirror_symmetric() {
         let library = Library::built_in();
         let has = |name: &str| library.effect(name).unwrap().is_mirror_symmetric();

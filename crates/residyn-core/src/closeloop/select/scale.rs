@@ -1,18 +1,14 @@
 use crate::closeloop::drive_gain::is_of_torque;
-use crate::closeloop::problem::Problem;
 use crate::data::Joint;
 use crate::model::{FittedEffect, Model};
 
 /// Sets in which fewer drives have gains, and all forces have another scale: gains of some drives look like other gains of the
 /// other drives on a rig that is heavier or lighter as a whole. Where bodies are free, only what is declared of them tells the
 /// scale. There is one set for each gain: that in which its drive has none.
-pub(super) fn at_other_scales(
-    problem: &Problem<'_>,
-    added: &[FittedEffect],
-) -> Vec<Vec<FittedEffect>> {
+pub(super) fn at_other_scales(declared: &Model, added: &[FittedEffect]) -> Vec<Vec<FittedEffect>> {
     let (gains, others): (Vec<FittedEffect>, Vec<FittedEffect>) =
         (added.iter().cloned()).partition(|own| factor(own).is_some());
-    if !has_free_scale(problem.declared) {
+    if !has_free_scale(declared) {
         return Vec::new();
     }
     let of_joint = |joint| {
@@ -22,13 +18,10 @@ pub(super) fn at_other_scales(
     let relative_to = |reference: &FittedEffect| {
         let scale = factor(reference)?;
         let relative = |joint| {
-            let effect = problem.measured(&reference.effect, joint);
-            with_factor(
-                FittedEffect::absent(&effect, joint),
-                of_joint(joint) / scale,
-            )
+            let gain = FittedEffect::absent(&reference.effect, joint);
+            with_factor(gain, of_joint(joint) / scale)
         };
-        let all: Option<Vec<_>> = Joint::all(problem.declared.joints).map(relative).collect();
+        let all: Option<Vec<_>> = Joint::all(declared.joints).map(relative).collect();
         let mut all = all?;
         let off = |own: &FittedEffect| factor(own).map_or(0.0, |factor| factor.ln().abs());
         all.sort_by(|a, b| off(b).total_cmp(&off(a)));
@@ -63,4 +56,49 @@ fn with_factor(effect: FittedEffect, factor: f64) -> Option<FittedEffect> {
         values: vec![(value, None)],
         ..effect
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::at_other_scales;
+    use crate::data::Joint;
+    use crate::model::{FittedEffect, Library};
+
+    /// Joints and values of the gains of each set, next to the friction that all sets keep.
+    fn gains(own: [f64; 2], free: bool) -> Vec<Vec<(usize, f64)>> {
+        let library = Library::built_in();
+        let on = |name: &str, joint: usize, value: f64| FittedEffect {
+            values: vec![(value, None)],
+            ..FittedEffect::absent(library.effect(name).unwrap(), Joint::at(joint))
+        };
+        let mut declared = library.model("acrobot").unwrap();
+        for parameter in &mut declared.parameters {
+            parameter.fixed |= !free;
+        }
+        let added = [
+            on("actuator_gain", 0, own[0]),
+            on("viscous_friction", 0, 0.2),
+            on("actuator_gain", 1, own[1]),
+        ];
+        let of_set = |set: &Vec<FittedEffect>| {
+            assert_eq!(set[0], added[1]);
+            let gains = set[1..].iter();
+            gains
+                .map(|gain| (gain.joint.index(), gain.values[0].0))
+                .collect()
+        };
+        at_other_scales(&declared, &added)
+            .iter()
+            .map(of_set)
+            .collect()
+    }
+
+    #[test]
+    fn two_gains_are_one_on_a_rig_of_other_masses() {
+        assert_eq!(gains([0.5, 2.0], true), [[(1, 1.0)], [(0, -0.5)]]);
+        assert!(
+            gains([0.5, 2.0], false).is_empty(),
+            "the file gives the masses"
+        );
+    }
 }

@@ -357,7 +357,7 @@ impl<'a> Search<'a> {
             let mut sets: Vec<_> = simpler.map(|set| set[declared..].to_vec()).collect();
             let exchanges = exchanges(problem, &current.fitted);
             sets.extend(exchanges.into_iter().map(|exchange| exchange.set));
-            sets.extend(at_other_scales(problem, &effects[declared..]));
+            sets.extend(at_other_scales(problem.declared, &effects[declared..]));
             let without = |k: usize| [&effects[declared..k], &effects[k + 1..]].concat();
             sets.extend(added.map(without));
             let good = self.as_good_as(best, &current, sets);
