@@ -153,7 +153,7 @@ impl Chosen {
         let (level, own) = (problem.settings.establish.false_alarm, &self.after);
         demote(&mut self.standings, |standing| {
             let without = standing.without.as_ref().ok()?;
-            let is_drawn = problem.is_by_law() && departs_from(own, without) < level;
+            let is_drawn = problem.is_by_law() && p_of_bodies(own, without) < level;
             let log = logs.fits_as_well_without(standing).filter(|_| !is_drawn)?;
             Some(format!(
                 "the torques of {} fit as well without it",
@@ -214,7 +214,7 @@ impl Chosen {
 }
 
 /// The probability that the declared values are off by so much more without an effect than with it.
-fn departs_from(with: &Fitted, without: &Fitted) -> f64 {
+fn p_of_bodies(with: &Fitted, without: &Fitted) -> f64 {
     p_of_departure(2.0 * (without.fit.prior_cost - with.fit.prior_cost), 1)
 }
 

@@ -1,3 +1,4 @@
+use super::simpler::is_free_of;
 use crate::closeloop::drive_gain::is_of_torque;
 use crate::data::Joint;
 use crate::model::{FittedEffect, Model};
@@ -26,7 +27,10 @@ pub(super) fn at_other_scales(declared: &Model, added: &[FittedEffect]) -> Vec<V
         let off = |own: &FittedEffect| factor(own).map_or(0.0, |factor| factor.ln().abs());
         all.sort_by(|a, b| off(b).total_cmp(&off(a)));
         all.truncate(gains.len() - 1);
-        Some([others.as_slice(), &all].concat())
+        // The file may declare gains of its own.
+        let mut drives = all.iter();
+        let are_free = drives.all(|gain| is_free_of(gain, &declared.effects));
+        are_free.then(|| [others.as_slice(), &all].concat())
     };
     gains.iter().filter_map(relative_to).collect()
 }
@@ -91,6 +95,19 @@ mod tests {
             .iter()
             .map(of_set)
             .collect()
+    }
+
+    #[test]
+    fn no_drive_has_two_gains() {
+        let library = Library::built_in();
+        let gain = |joint: usize, value: f64| FittedEffect {
+            values: vec![(value, None)],
+            ..FittedEffect::absent(library.effect("actuator_gain").unwrap(), Joint::at(joint))
+        };
+        let mut declared = library.model("acrobot").unwrap();
+        declared.effects = vec![gain(0, 0.1)];
+        let sets = at_other_scales(&declared, &[gain(0, 0.5), gain(1, 2.0)]);
+        assert_eq!(sets, [[gain(1, 1.0)]]);
     }
 
     #[test]

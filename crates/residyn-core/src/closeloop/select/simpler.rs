@@ -30,7 +30,7 @@ pub(super) fn simpler(
 }
 
 /// Whether an effect can be added to others: no effect can act twice.
-fn is_free_of(new: &FittedEffect, others: &[FittedEffect]) -> bool {
+pub(super) fn is_free_of(new: &FittedEffect, others: &[FittedEffect]) -> bool {
     !others.iter().any(|other| other.excludes(new))
 }
 
