@@ -8,7 +8,7 @@ use residyn_core::identify::{Shooting, Values, cut, fit, uncertainty};
 use residyn_core::model::{Dynamics, FittedEffect, Library, Model};
 use residyn_core::sim::Integrator;
 use residyn_formats::{ExportModel, find};
-use residyn_io::plant_from_text;
+use residyn_io::{plant_from_text, read_log, read_model, with_values_of};
 use serde_json::Value;
 
 use crate::support::catalogue::{effect, rng};
@@ -222,6 +222,84 @@ fn a_wrong_table_is_refused_with_its_place() {
         let refused = library.model_from_text("servo.toml", &text).unwrap_err();
         says_words(&refused.to_string(), &words);
     }
+}
+
+#[test]
+fn a_file_beside_a_log_and_its_recording_give_values_there() {
+    let scratch = Scratch::new();
+    let tables = "[logs.\"*\"]\nkd = 0.5\nkp = 12\n";
+    scratch.file("servo.toml", servo(KNOWN, ", fixed = true", tables));
+    scratch.simulates("servo-real", &[1, 2]);
+    scratch.file("run1.csv.toml", "kp = 30\n");
+    let library = Library::built_in();
+    let model = read_model(scratch.path("servo.toml"), &library).unwrap();
+    let read = |name: &str| read_log(scratch.path(name), &model).unwrap();
+    let (first, mut second) = (read("run1.csv"), read("run2.csv"));
+    // Of what a recording says, the model file knows better, and some is none of its parameters.
+    second.values = vec![("kd".into(), 7.0), ("m".into(), 0.5), ("site".into(), 3.0)];
+    let known = with_values_of(&model, [&first, &second]).unwrap();
+    for (name, log, wanted) in [
+        ("kp", &first, 30.0),
+        ("kd", &first, 0.5),
+        ("kp", &second, 12.0),
+        ("kd", &second, 0.5),
+        ("m", &second, 0.5),
+        ("m", &first, 0.0),
+    ] {
+        assert_eq!(value(&known, name, log), wanted, "{name} in {}", log.name());
+    }
+    let written = library
+        .model_from_text("known.toml", &known.file_text())
+        .unwrap();
+    assert_eq!(value(&written, "kp", &first), 30.0);
+    assert_eq!(value(&written, "m", &second), 0.5);
+    let said = scratch
+        .run("evaluate --model servo.toml --test run1.csv")
+        .stderr;
+    says(
+        &String::from_utf8(said).unwrap(),
+        &["note: run1.csv: in this log kp = 30"],
+    );
+}
+
+/// What a file beside a log says, and words of the message.
+const WRONG_BESIDE: &str = r#"
+kq = 3      | run1.csv.toml, line 1, column 1: unknown key `kq` ... did you mean `kp`
+kp = "high" | run1.csv.toml, line 1, column 6
+m = -1      | `m` is -1, outside its bounds 0 to inf
+J =         | run1.csv.toml, line 1
+"#;
+
+#[test]
+fn a_wrong_file_beside_a_log_is_refused_with_its_place() {
+    let scratch = Scratch::new();
+    scratch.file("servo.toml", servo(KNOWN, ", positive = true", ""));
+    scratch.simulates("servo-real", &[1]);
+    for [text, words] in rows(WRONG_BESIDE) {
+        scratch.file("run1.csv.toml", text);
+        let ran = scratch.run("audit --model servo.toml run1.csv");
+        assert_eq!(ran.status.code(), Some(2));
+        says_words(&String::from_utf8(ran.stderr).unwrap(), &words);
+    }
+    let model = read_model(scratch.path("servo.toml"), &Library::built_in()).unwrap();
+    let mut log = read_log(scratch.path("run1.csv"), &model).unwrap();
+    log.path = "run7.csv".into();
+    log.values = vec![("m".into(), -2.0)];
+    let refused = with_values_of(&model, [&log]).unwrap_err();
+    says(
+        &refused.to_string(),
+        &["run7.csv: `m` is -2, outside its bounds"],
+    );
+    log.values = vec![("m".into(), 2.0)];
+    let twin = Log {
+        path: "other/run7.csv".into(),
+        ..log.clone()
+    };
+    let refused = with_values_of(&model, [&log, &twin]).unwrap_err();
+    says(
+        &refused.to_string(),
+        &["run7.csv: has values of its own and the file name of other/run7.csv"],
+    );
 }
 
 #[test]

@@ -6,8 +6,9 @@ use std::path::Path;
 use residyn_core::data::{Columns, Log, Quantity};
 use residyn_io::read_rig_log;
 
-use crate::support::log_files::formats;
+use crate::support::log_files::{formats, recordings};
 use crate::support::says;
+use crate::support::tables::says_words;
 
 fn read(path: &Path) -> Result<Log, String> {
     read_rig_log(path, 2, &Columns::default()).map_err(|error| error.to_string())
@@ -97,6 +98,47 @@ mod slow {
         ] {
             let said = read(&folder.join(name)).unwrap_err();
             assert!(said.contains(wanted), "{said}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_the_whole_run_come_with_its_log() {
+        let wanted = [("kp".to_owned(), 40.0), ("gain".to_owned(), 0.5)];
+        let Some(folder) = formats() else { return };
+        for name in ["values.npz", "values.pt", "values.h5"] {
+            let log = read(&folder.join(name)).unwrap();
+            assert!(
+                wanted.iter().all(|value| log.values.contains(value)),
+                "{name}"
+            );
+            assert_eq!(log.values.len(), 2, "{name}");
+        }
+        let Some(folder) = recordings() else { return };
+        let named = Columns {
+            joint_names: vec!["elbow".into(), "wrist".into()],
+            ..Columns::default()
+        };
+        let log = read_rig_log(folder.join("ros_json.mcap"), 2, &named).unwrap();
+        assert_eq!(log.values, wanted[..1]);
+    }
+
+    #[test]
+    fn torques_on_a_clock_of_their_own_hold_until_the_next() {
+        let Some(folder) = formats() else { return };
+        let wanted = read(&folder.join("run.csv")).unwrap();
+        for name in ["clocks.npz", "clocks.pt", "clocks.h5"] {
+            let log = read(&folder.join(name)).unwrap();
+            assert!(
+                log.time == wanted.time[2..] && log.q[0] == wanted.q[0][2..],
+                "{name}"
+            );
+            let held = |row: usize| wanted.tau[1][2 + 3 * (row / 3)];
+            let held: Vec<f64> = (0..log.rows()).map(held).collect();
+            assert_eq!(log.tau[1], held, "{name}");
+            says_words(
+                &log.notes.join("\n"),
+                "tau is on the clock tau_time ... 2 rows before its first are left out",
+            );
         }
     }
 

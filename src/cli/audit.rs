@@ -35,6 +35,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let logs = terminal::stage("reading the logs", || read(arguments, model.as_ref()))?;
     let columns = (model.as_ref()).map_or_else(Columns::default, |model| model.columns.clone());
     inputs::print_notes(&logs);
+    if let Some(model) = &model {
+        inputs::with_values_of(model, &logs)?;
+    }
     for pattern in model.iter().flat_map(|model| model.unmatched(&logs)) {
         terminal::say(format!(
             "note: [logs.{pattern:?}] of the model matches none of these logs"

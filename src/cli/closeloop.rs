@@ -213,6 +213,7 @@ fn measured(arguments: &Arguments, rig: &robot::Declared, logs: &Logs) -> Result
     let mut test = read_logs(&logs.test, &declared)?;
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
     let logs = || train.iter().chain(&test);
+    let declared = inputs::with_values_of(&declared, logs())?;
     inputs::print_notes(logs());
     for log in logs().filter(|log| log.is_long()) {
         terminal::say(format!(

@@ -68,10 +68,12 @@ struct LogEntry {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let (declared, dynamics) = model(arguments)?;
+    let (declared, trained) = model(arguments)?;
     let mut logs = terminal::stage("reading the logs", || {
         read_logs(logs_in(&arguments.test)?, &declared)
     })?;
+    let declared = inputs::with_values_of(&declared, &logs)?;
+    let dynamics = trained.unwrap_or_else(|| declared.dynamics());
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
     if let Source::File(file) = arguments.model.source() {
         inputs::print_findings(file, &declared, arguments.common.seed);
@@ -129,18 +131,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 }
 
 /// The declared model, for the columns of its logs, and the dynamics to integrate.
-fn model(arguments: &Arguments) -> Result<(Model, Dynamics)> {
+/// The model as its file declares it, and that of a checkpoint as it was trained.
+fn model(arguments: &Arguments) -> Result<(Model, Option<Dynamics>)> {
     let library = arguments.effects.library()?;
     match arguments.model.source() {
-        Source::File(file) => {
-            let declared = read_model(file, &library)?;
-            let dynamics = declared.dynamics();
-            Ok((declared, dynamics))
-        }
+        Source::File(file) => Ok((read_model(file, &library)?, None)),
         Source::Checkpoint(dir) => {
             let (_, declared, trained) = Checkpoint::open(dir, &library, arguments.common.device)?;
             let dynamics = trained.to_dynamics()?;
-            Ok((declared, dynamics))
+            Ok((declared, Some(dynamics)))
         }
     }
 }

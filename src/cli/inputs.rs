@@ -124,6 +124,21 @@ pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
     }
 }
 
+/// The model with what is known of each log alone, which is printed on standard error.
+pub(super) fn with_values_of<'l>(
+    model: &Model,
+    logs: impl IntoIterator<Item = &'l Log>,
+) -> Result<Model> {
+    let known = residyn_io::with_values_of(model, logs)?;
+    for table in &known.configurations[model.configurations.len()..] {
+        let values = table.given.iter();
+        let values = values.map(|(k, value)| format!("{} = {value}", model.parameters[*k].name));
+        let values = values.collect::<Vec<_>>().join(", ");
+        terminal::say(format!("note: {}: in this log {values}", table.pattern));
+    }
+    Ok(known)
+}
+
 /// Print on standard error what is serious about logs, before anything is computed from them.
 pub(super) fn print_faults<'a>(audits: impl IntoIterator<Item = &'a Audit>) {
     let audits: Vec<&Audit> = audits.into_iter().collect();

@@ -77,6 +77,12 @@ turned = {"time": table[:, 0], "observations/qpos": table[:, 2:0:-1], "observati
 hdf5("episode.hdf5", turned, joint_names=["wrist", "elbow"])
 hdf5("named.hdf5", {**turned, "joint_names": ["wrist", "elbow"]})
 hdf5("demos.hdf5", {f"data/demo_{k}/{name}": values for k in range(5) for name, values in turned.items()})
+# What is known of the whole run, and torques on a clock of their own: every third row, from the third on.
+slow = {"tau": channels["tau"][2::3], "tau_time": table[2::3, 0]}
+numpy.savez(folder / "values.npz", **channels, kp=40, gain=numpy.array([0.5]))
+numpy.savez(folder / "clocks.npz", **{**channels, **slow})
+hdf5("values.h5", channels, kp=40.0, gain=0.5, site="lab")
+hdf5("clocks.h5", {**channels, **slow})
 with h5py.File(folder / "seven.mat", "w", userblock_size=512) as file:
     for name, values in {**channels, "note": numpy.array([[ord(letter)] for letter in "left"], dtype=numpy.uint16), "none": numpy.zeros(2, dtype=numpy.uint64)}.items():
         array = file.create_dataset(f"rig/{name}" if name == "q" else name, data=numpy.atleast_2d(values.T))
@@ -177,6 +183,8 @@ wide = numpy.zeros((len(table), 4), dtype=numpy.float32)
 wide[:, 1:3] = table[:, 5:7]
 pace = {"time": table[:, 0].astype(numpy.float32), "dof_pos": numpy.asfortranarray(table[:, 1:3].astype(numpy.float32)), "des_dof_pos": wide[:, 1:3]}
 torch_save(folder / "pace.pt", pace)
+torch_save(folder / "values.pt", {**channels, "kp": 40, "gain": 0.5, "site": "lab"})
+torch_save(folder / "clocks.pt", {"time": table[:, 0].copy(), "dof_pos": table[:, 1:3], "dof_vel": table[:, 3:5], "torques": slow["tau"], "torques_time": slow["tau_time"]})
 torch_save(folder / "named.pt", {**pace, "joint_names": names, "kp": numpy.full(2, 20.0)})
 torch_save(folder / "ticks.pt", {**pace, "time": numpy.arange(len(table))})
 torch_save(folder / "legged.pt", {"time": table[:, 0].copy(), "dof_pos": table[:, 1:3], "dof_vel": table[:, 3:5], "torques": table[:, 5:7], "des_dof_vel": wide})

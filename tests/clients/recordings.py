@@ -142,6 +142,7 @@ def record_json(name, schema, topic, message):
         for row, stamp in enumerate(stamps):
             data = json.dumps(message(row, stamp)).encode()
             writer.add_message(channel, stamp + LATE, data, stamp + LATE)
+        writer.add_metadata("run", {"kp": "40", "site": "lab"})
         writer.finish()
 
 

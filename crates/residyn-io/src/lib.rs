@@ -5,6 +5,7 @@ pub mod files;
 mod guarded;
 mod log_file;
 mod log_folder;
+mod log_values;
 mod model_file;
 mod plant_file;
 pub mod runs;
@@ -16,6 +17,7 @@ pub use log_file::{
     read_standard_log_from, write_log,
 };
 pub use log_folder::logs_in;
+pub use log_values::with_values_of;
 pub use model_file::{effect_files, read_effect, read_model, with_effects_in};
 pub use plant_file::{plant_from_text, read_plant};
 pub use table::{LOG_FORMATS, LogFormat};

@@ -128,7 +128,7 @@ mod tests {
     use std::fs;
     use std::io::Write;
 
-    use residyn_core::data::Column;
+    use residyn_core::data::{Column, Quantity, TorqueColumn};
 
     use super::*;
 
@@ -301,6 +301,73 @@ mod tests {
             "{empty}"
         );
         assert!(message("0,5,1\n1,6,2\n").contains("time = 1, q = [2]"));
+    }
+
+    /// The angles and commands of a table with columns time, q1 and cmd1.
+    fn commanded(text: &str) -> Result<Log, LogError> {
+        let columns = Columns {
+            driven_by: Quantity::Command,
+            ..Columns::default()
+        };
+        read_as(text, 1, &columns)
+    }
+
+    #[test]
+    fn commands_on_another_clock_hold_until_the_next() {
+        let merged = "time,q1,cmd1\n0,1,\n0.1,,5\n0.2,2,\n0.25,,6\n0.3,,7\n0.4,3,\n0.6,4,nan\n";
+        let log = commanded(merged).unwrap();
+        assert_eq!(log.time, [0.2, 0.4, 0.6]);
+        assert_eq!(
+            (&log.q[0], &log.tau[0]),
+            (&vec![2.0, 3.0, 4.0], &vec![5.0, 7.0, 7.0])
+        );
+        let said = log.notes.join("\n");
+        assert!(
+            said.contains("another clock") && said.contains("for 0.300 s at most"),
+            "{said}"
+        );
+        // At fewer times than angles, in the same rows.
+        let slow = "time,q1,cmd1\n0,1,5\n1,2,\n2,3,\n3,4,6\n4,5,\n";
+        assert_eq!(commanded(slow).unwrap().tau[0], [5.0, 5.0, 5.0, 6.0, 6.0]);
+        // Angles at fewer times than commands.
+        let fast = "time,q1,cmd1\n0,1,5\n1,,6\n2,,7\n2.5,,7\n3,4,8\n";
+        assert_eq!(commanded(fast).unwrap().tau[0], [5.0, 8.0]);
+    }
+
+    #[test]
+    fn a_missing_cell_is_no_clock() {
+        for (text, wanted) in [
+            (
+                "time,q1,cmd1\n0,1,5\n1,2,\n2,3,6\n3,4,7\n",
+                "line 3, column \"cmd1\": is empty",
+            ),
+            (
+                "time,q1,cmd1\n0,1,\n1,2,\n2,3,\n",
+                "line 2, column \"cmd1\": is empty",
+            ),
+            (
+                "time,q1,qd1,cmd1\n0,1,2,3\n1,,2,\n2,1,2,3\n",
+                "line 3, column \"q1\": is empty",
+            ),
+            (
+                "time,q1,cmd1\n0,1,5\n1,,x\n2,3,\n",
+                "line 3, column \"q1\": is empty",
+            ),
+            (
+                "time,q1,cmd1\n0,1,5\n,,6\n2,3,6\n",
+                "line 3, column \"time\": is empty",
+            ),
+        ] {
+            let said = commanded(text).unwrap_err().to_string();
+            assert!(said.contains(wanted), "{said}");
+        }
+        let readings = Columns {
+            torque: Some(TorqueColumn::Sampled),
+            ..Columns::default()
+        };
+        let sampled = read_as("time,q1,tau1\n0,1,5\n1,2,\n2,3,\n", 1, &readings);
+        let said = sampled.unwrap_err().to_string();
+        assert!(said.contains("line 3, column \"tau1\": is empty"), "{said}");
     }
 
     #[test]

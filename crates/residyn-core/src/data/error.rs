@@ -216,6 +216,15 @@ pub enum CellFault {
 }
 
 impl CellFault {
+    /// Whether a cell has no value: a table of several clocks has such cells.
+    pub(super) fn is_gap(&self) -> bool {
+        match self {
+            Self::Empty => true,
+            Self::NotFinite(text) => text.parse::<f64>().is_ok_and(f64::is_nan),
+            _ => false,
+        }
+    }
+
     /// What is wrong with a number that is not a valid reading.
     pub fn of_number(number: f64) -> Self {
         match number.is_finite() {

@@ -102,6 +102,7 @@ impl Log {
             masked: self.masked.iter().map(marked).collect(),
             filled: marked(&self.filled),
             leave_out: self.leave_out.clone(),
+            values: self.values.clone(),
             notes: self.notes.clone(),
         }
     }

@@ -83,6 +83,8 @@ pub struct Log {
     pub filled: Vec<usize>,
     /// Intervals that are neither fitted nor scored, for instance because a person touched the rig.
     pub leave_out: Vec<Interval>,
+    /// Single numbers that the recording has besides its columns, by name.
+    pub values: Vec<(String, f64)>,
     /// What a reader of the log should know about how it was read, one sentence each.
     pub notes: Vec<String>,
 }
@@ -103,6 +105,7 @@ impl Log {
             masked: vec![Vec::new(); joints],
             filled: Vec::new(),
             leave_out: Vec::new(),
+            values: Vec::new(),
             notes: Vec::new(),
         }
     }

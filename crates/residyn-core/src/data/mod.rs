@@ -9,6 +9,7 @@
 
 mod audit;
 mod channels;
+mod clocks;
 mod column;
 mod columns;
 mod direction;

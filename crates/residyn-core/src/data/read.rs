@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
+use super::clocks::Merged;
 use super::column::{Quantity, unwrap};
 use super::columns::{Cell, Columns, Header, Layout, MeasuredCell, joints};
-use super::error::{CellFault, LogError};
+use super::error::{CellFault, LogError, Place};
 use super::joint::Joint;
 use super::late;
 use super::local_cubic::slopes;
@@ -13,6 +14,7 @@ use super::log::Log;
 use super::measured::Measured;
 use super::statistics::median;
 use super::table::{Arrays, Numeric, Table};
+use super::torque_column::TorqueColumn;
 use crate::expr::listed;
 use crate::limits::{LOG_JOINTS, LOG_TIME, is_reading, log_steps, too_large};
 
@@ -39,12 +41,21 @@ impl Log {
         };
         let layout = header.layout(joints, columns)?;
         let numbers = numbers(&header, table, &layout, joints)?;
+        let merged = merged(&numbers, &layout, columns);
+        let on_one_clock = |column: Numeric| match &merged {
+            Some(merged) => merged.column(column),
+            None => column.without_gaps(),
+        };
+        let numbers: Vec<Numeric> = numbers.into_iter().map(on_one_clock).collect();
+        let (rows, note) = merged.map(|merged| (merged.rows, merged.note)).unzip();
         let mut readings = Readings {
             header: &header,
             table,
             numbers: numbers.into_iter(),
+            rows,
             notes: [table.notes().to_vec(), notes(&layout, columns.driven_by)].concat(),
         };
+        readings.notes.extend(note);
         let time = readings.time(&layout.time)?;
         let mut channel = |cells: &[Cell]| -> Result<Vec<Vec<f64>>, LogError> {
             let each = cells.iter().map(|cell| readings.channel(cell, &time));
@@ -66,6 +77,7 @@ impl Log {
             tau: tau.unwrap_or_else(|| vec![vec![0.0; time.len()]; joints]),
             driven_by: columns.driven_by,
             measured,
+            values: readings.table.values().to_vec(),
             notes: readings.notes,
             q,
             time,
@@ -187,18 +199,41 @@ fn numbers(
     Ok(numbers.columns)
 }
 
+/// The rows of a table that has commands on another clock than angles. Readings of a sensor and means hold for no time.
+fn merged(numbers: &[Numeric], layout: &Layout, columns: &Columns) -> Option<Merged> {
+    if columns.torque.unwrap_or_default() != TorqueColumn::Held {
+        return None;
+    }
+    let (time, channels) = numbers.split_first()?;
+    let states = layout.q.len() + layout.qd.as_ref().map_or(0, Vec::len);
+    let (states, held) = channels.split_at(states);
+    Merged::of(time, states, held, columns.driven_by)
+}
+
 /// The columns of a table as they become the channels of a log.
 struct Readings<'t> {
     header: &'t Header<'t>,
     table: &'t dyn Table,
     /// Those of the layout's cells, in their order, as far as they are not read yet.
     numbers: std::vec::IntoIter<Numeric>,
+    /// Their rows in the table, if these are not all.
+    rows: Option<Vec<usize>>,
     notes: Vec<String>,
 }
 
 impl Readings<'_> {
+    /// Where a row of the numbers is.
+    fn place(&self, row: usize) -> Result<Place, LogError> {
+        self.table
+            .place(self.rows.as_ref().map_or(row, |rows| rows[row]))
+    }
+
     fn fault(&self, row: usize, cell: &Cell, fault: CellFault) -> LogError {
-        match self.table.place(row) {
+        self.fault_at(self.place(row), cell, fault)
+    }
+
+    fn fault_at(&self, place: Result<Place, LogError>, cell: &Cell, fault: CellFault) -> LogError {
+        match place {
             Ok(place) => LogError::Cell {
                 path: self.header.path.to_owned(),
                 place,
@@ -220,7 +255,7 @@ impl Readings<'_> {
             *value = reading;
         }
         match read.fault {
-            Some(why) => Err(self.fault(read.values.len(), cell, why)),
+            Some((row, why)) => Err(self.fault_at(self.table.place(row), cell, why)),
             None => Ok(read.values),
         }
     }
@@ -232,7 +267,7 @@ impl Readings<'_> {
             let late = CellFault::NotLater {
                 time: time[previous + 1],
                 previous: time[previous],
-                previous_place: self.table.place(previous)?,
+                previous_place: self.place(previous)?,
             };
             return Err(self.fault(previous + 1, cell, late));
         }
@@ -243,7 +278,7 @@ impl Readings<'_> {
             let long = CellFault::Pause {
                 pause_s: pause.length_s,
                 step_s: pause.step_s,
-                previous_place: self.table.place(pause.row - 1)?,
+                previous_place: self.place(pause.row - 1)?,
             };
             return Err(self.fault(pause.row, cell, long));
         }

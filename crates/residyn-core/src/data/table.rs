@@ -27,6 +27,11 @@ pub trait Table {
     /// A file that cannot be read again.
     fn place(&self, row: usize) -> Result<Place, LogError>;
 
+    /// Single numbers that it has besides its columns, by name.
+    fn values(&self) -> &[(String, f64)] {
+        &[]
+    }
+
     /// What a reader of the log should know about how the file was read.
     fn notes(&self) -> &[String] {
         &[]
@@ -43,11 +48,15 @@ pub struct Numbers {
     pub ragged: Option<(usize, usize)>,
 }
 
-/// The numbers of a column up to its first cell that is not a finite number, and what is wrong with that cell.
+/// The numbers of a column up to its first cell that holds something else.
 #[derive(Clone, Default)]
 pub struct Numeric {
+    /// NaN where a cell is empty.
     pub values: Vec<f64>,
-    pub fault: Option<CellFault>,
+    /// The first empty cell, its row and what is wrong with it.
+    pub gap: Option<(usize, CellFault)>,
+    /// The row at which the numbers end, and what is wrong with its cell.
+    pub fault: Option<(usize, CellFault)>,
 }
 
 impl Numbers {
@@ -65,11 +74,31 @@ impl Numeric {
     /// Reads one more cell.
     pub fn push(&mut self, number: impl FnOnce() -> Result<f64, CellFault>) {
         if self.fault.is_none() {
+            let row = self.values.len();
             match number() {
                 Ok(number) => self.values.push(number),
-                Err(fault) => self.fault = Some(fault),
+                Err(fault) if fault.is_gap() => {
+                    self.gap.get_or_insert((row, fault));
+                    self.values.push(f64::NAN);
+                }
+                Err(fault) => self.fault = Some((row, fault)),
             }
         }
+    }
+
+    /// Whether a row has no value.
+    pub fn is_empty_at(&self, row: usize) -> bool {
+        self.values.get(row).is_none_or(|value| value.is_nan())
+    }
+
+    /// The same if no cell may be empty: the numbers end at the first.
+    #[must_use]
+    pub fn without_gaps(mut self) -> Self {
+        if let Some((row, fault)) = self.gap.take() {
+            self.values.truncate(row);
+            self.fault = Some((row, fault));
+        }
+        self
     }
 }
 
@@ -79,6 +108,8 @@ pub struct Arrays {
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
     most_bytes: u64,
+    /// Single numbers besides the columns, by name.
+    pub values: Vec<(String, f64)>,
     /// What a reader of the log should know about how they were read.
     pub notes: Vec<String>,
 }
@@ -90,6 +121,7 @@ impl Arrays {
             names: Vec::new(),
             columns: Vec::new(),
             most_bytes: unpacked_bytes(packed),
+            values: Vec::new(),
             notes: Vec::new(),
         }
     }
@@ -98,6 +130,59 @@ impl Arrays {
         self.names.push(name.into());
         self.columns.push(column);
     }
+
+    /// The same on the clock of the column `time`: a column with times of its own, `cmd_time` those of `cmd1` and `cmd2`, holds
+    /// from one value to the next. Rows before its first are dropped.
+    #[must_use]
+    pub fn on_one_clock(mut self) -> Self {
+        let of = |name: &str| self.names.iter().position(|own| own == name);
+        let Some(time) = of("time") else {
+            return self;
+        };
+        let clocks = self.names.iter().enumerate();
+        let clocks =
+            clocks.filter_map(|(k, name)| Some((k, name.strip_suffix("_time")?.to_owned())));
+        for (clock, stem) in clocks.collect::<Vec<_>>() {
+            self.hold(time, clock, &stem);
+        }
+        self
+    }
+
+    /// Holds the columns of a stem, which are on the clock of one column, at the times of another.
+    fn hold(&mut self, time: usize, clock: usize, stem: &str) {
+        let own = self.columns[clock].clone();
+        let is_of_stem = |name: &String| name.strip_prefix(stem).is_some_and(is_of_joint);
+        let held: Vec<usize> = (0..self.names.len())
+            .filter(|k| *k != clock && is_of_stem(&self.names[*k]))
+            .filter(|k| self.columns[*k].len() == own.len())
+            .collect();
+        if held.is_empty() || own.is_empty() || !own.is_sorted() {
+            return;
+        }
+        let times = &self.columns[time];
+        let early = times.partition_point(|time| own.first().is_some_and(|first| time < first));
+        let rows = times.len();
+        let last = times[early..]
+            .iter()
+            .map(|time| own.partition_point(|own| own <= time));
+        let last: Vec<usize> = last.map(|count| count.saturating_sub(1)).collect();
+        for (k, column) in self.columns.iter_mut().enumerate() {
+            if held.contains(&k) {
+                *column = last.iter().map(|row| column[*row]).collect();
+            } else if column.len() == rows {
+                column.drain(..early);
+            }
+        }
+        self.notes.push(format!(
+            "{stem} is on the clock {}: each value holds until the next; {early} rows before its first are left out",
+            self.names[clock]
+        ));
+    }
+}
+
+/// Whether this follows the stem in the name of a joint's column: `1`, `_elbow`, or nothing.
+fn is_of_joint(rest: &str) -> bool {
+    rest.starts_with('_') || rest.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 impl Table for Arrays {
@@ -136,6 +221,10 @@ impl Table for Arrays {
         Ok(Place::Row(row + 1))
     }
 
+    fn values(&self) -> &[(String, f64)] {
+        &self.values
+    }
+
     fn notes(&self) -> &[String] {
         &self.notes
     }
@@ -143,13 +232,19 @@ impl Table for Arrays {
 
 impl Numeric {
     /// A column of a table with this many rows.
-    fn of(mut values: Vec<f64>, rows: usize) -> Self {
-        let bad = values.iter().position(|value| !value.is_finite());
-        let fault = match bad {
-            Some(row) => Some(CellFault::NotFinite(values[row].to_string())),
-            None => (values.len() < rows).then_some(CellFault::Empty),
-        };
-        values.truncate(bad.unwrap_or(rows));
-        Self { values, fault }
+    fn of(values: Vec<f64>, rows: usize) -> Self {
+        let mut column = Self::default();
+        column.values.reserve_exact(values.len());
+        let is_short = values.len() < rows;
+        for value in values {
+            column.push(|| match value.is_finite() {
+                true => Ok(value),
+                false => Err(CellFault::NotFinite(value.to_string())),
+            });
+        }
+        if is_short && column.fault.is_none() {
+            column.fault = Some((column.values.len(), CellFault::Empty));
+        }
+        column
     }
 }

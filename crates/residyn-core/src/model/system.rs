@@ -247,7 +247,7 @@ impl Model {
     }
 
     /// How declared parameters differ between logs.
-    fn differing(&self) -> Differing<'_> {
+    pub(super) fn differing(&self) -> Differing<'_> {
         Differing {
             configurations: &self.configurations,
             own: &self.own,

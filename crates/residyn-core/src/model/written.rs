@@ -35,9 +35,30 @@ impl Model {
         text
     }
 
+    /// Write values of one log into the declaration, as its table `[logs."name"]`.
+    pub(super) fn declare_values_in<'v>(
+        &mut self,
+        log: &str,
+        values: impl Iterator<Item = (&'v str, f64)>,
+    ) {
+        let mut document = self.declaration_document();
+        let logs = document["logs"].or_insert(toml_edit::table());
+        if let Some(tables) = logs.as_table_mut() {
+            tables.set_implicit(true);
+        }
+        let table = logs[log].or_insert(toml_edit::table());
+        for (name, value) in values {
+            table[name] = toml_edit::value(value);
+        }
+        self.declaration = document.to_string();
+    }
+
+    fn declaration_document(&self) -> toml_edit::DocumentMut {
+        (self.declaration.parse()).expect("the declaration was read as TOML before")
+    }
+
     fn declaration_with_values(&self) -> String {
-        let mut document: toml_edit::DocumentMut =
-            (self.declaration.parse()).expect("the declaration was read as TOML before");
+        let mut document = self.declaration_document();
         for (k, parameter) in self.parameters.iter().enumerate() {
             let entry = &mut document["parameters"][&parameter.name];
             if let Some(table) = entry.as_table_like_mut() {

@@ -49,7 +49,10 @@ impl Unpacked {
     ) -> Result<(), String> {
         let columns = array.columns(name, &mut self.budget)?;
         for (index, column) in columns.into_iter().enumerate() {
-            self.table.add(of_column(index), column);
+            match column[..] {
+                [value] => self.table.values.push((of_column(index), value)),
+                _ => self.table.add(of_column(index), column),
+            }
         }
         match self.table.names().len() > LOG_COLUMNS {
             true => Err(format!("has more than {LOG_COLUMNS} columns")),

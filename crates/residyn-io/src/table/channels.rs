@@ -56,7 +56,7 @@ impl Channels {
         let columns = shape.get(1).copied().unwrap_or(1);
         let is_table = (1..=2).contains(&shape.len());
         if !is_channel(name) {
-            return Ok(is_table && columns <= LOG_COLUMNS);
+            return Ok(shape.len() <= 2 && columns <= LOG_COLUMNS);
         }
         if !is_table {
             return Err(format!(
@@ -82,6 +82,9 @@ impl Channels {
         name: &str,
         array: Array<impl Read>,
     ) -> Result<(), String> {
+        if let Some(stem) = name.strip_suffix("_time").and_then(|of| self.stem(of)) {
+            return unpacked.add(&format!("{stem}_time"), array);
+        }
         match self.stem(name) {
             Some(stem) if !self.joints.is_empty() => unpacked.add_as(name, array, |column| {
                 format!("{stem}_{}", self.joints[column])

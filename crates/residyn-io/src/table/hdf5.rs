@@ -6,7 +6,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use hdf5_reader::group::Group;
-use hdf5_reader::{Dataset, Datatype, Hdf5File, OpenOptions};
+use hdf5_reader::{Attribute, Dataset, Datatype, Hdf5File, OpenOptions};
 
 use super::arrays::Unpacked;
 use super::channels::{Channels, JOINTS, is_channel};
@@ -64,6 +64,7 @@ fn table(path: &Path, groups: &[String]) -> Result<Arrays, String> {
         .with_max_read_bytes(largest);
     let file = Hdf5File::open_with_options(path, options).map_err(damaged)?;
     let root = file.root_group().map_err(damaged)?;
+    let values = values(&root)?;
     let mut found = Found::in_group(root)?;
     found.keep(groups)?;
     if let Some(several) = found.several(path, groups) {
@@ -71,11 +72,23 @@ fn table(path: &Path, groups: &[String]) -> Result<Arrays, String> {
     }
     let channels = found.channels()?;
     let mut unpacked = Unpacked::of(packed);
+    unpacked.table.values = values;
     for (name, array) in channels.names.iter().zip(&found.arrays) {
         add(&mut unpacked, &channels, name, &array.dataset)?;
     }
     unpacked.table.notes.extend(channels.note());
-    Ok(unpacked.table)
+    Ok(unpacked.table.on_one_clock())
+}
+
+/// The attributes of the file that are single numbers.
+fn values(root: &Group) -> Result<Vec<(String, f64)>, String> {
+    let attributes = root.attributes().map_err(damaged)?;
+    let number = |attribute: &Attribute| {
+        let is_single = attribute.num_elements().ok()? == 1;
+        let value = attribute.read_as_f64().ok().filter(|_| is_single)?;
+        Some((attribute.name.clone(), value))
+    };
+    Ok(attributes.iter().filter_map(number).collect())
 }
 
 /// An array in a file.

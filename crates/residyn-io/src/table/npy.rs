@@ -78,14 +78,14 @@ impl<R: Read> Array<R> {
         self.kind.starts_with("<U") || self.kind.starts_with("|S")
     }
 
-    /// Its columns: one for a vector, as many as it has for a matrix with one row per sample; none for other arrays or
-    /// for texts. Objects are refused unread, since reading them runs the code that they name.
+    /// Its columns: one for a vector or a single number, as many as it has for a matrix with one row per sample; none for
+    /// other arrays or for texts. Objects are refused unread, since reading them runs the code that they name.
     ///
     /// # Errors
     /// An array that holds something else, has too many columns or numbers, or is cut off.
     #[allow(clippy::cast_precision_loss)] // logged integers are far below 2^53
     pub fn columns(self, name: &str, budget: &mut Budget) -> Result<Vec<Vec<f64>>, String> {
-        if self.is_text() || !(1..=2).contains(&self.shape.len()) {
+        if self.is_text() || self.shape.len() > 2 {
             return Ok(Vec::new());
         }
         let columns = match self.kind.as_str() {

@@ -37,6 +37,7 @@ fn table(path: &Path, packed: u64) -> Result<Arrays, String> {
         return Err("holds no dictionary; save one of tensors, `torch.save({\"time\": time, \"dof_pos\": q, ..}, path)`".to_owned());
     };
     unpacked.table.notes.extend(left_out(&entries)?);
+    unpacked.table.values = values(&entries);
     let mut tensors: Vec<Tensor> = PytorchReader::new(path)
         .map_err(broken)?
         .into_tensors()
@@ -51,7 +52,7 @@ fn table(path: &Path, packed: u64) -> Result<Arrays, String> {
         add(&mut unpacked, &channels, &tensor)?;
     }
     unpacked.table.notes.extend(channels.note());
-    Ok(unpacked.table)
+    Ok(unpacked.table.on_one_clock())
 }
 
 /// The columns of a tensor of numbers.
@@ -69,6 +70,19 @@ fn add(unpacked: &mut Unpacked, channels: &Channels, tensor: &Tensor) -> Result<
         numbers: Cursor::new(numbers),
     };
     channels.add(unpacked, name, array)
+}
+
+/// The entries that are plain numbers.
+#[allow(clippy::cast_precision_loss)] // whole numbers beyond 2^53 are no values of parameters
+fn values(entries: &HashMap<String, PickleValue>) -> Vec<(String, f64)> {
+    let number = |(name, value): (&String, &PickleValue)| match value {
+        PickleValue::Int(value) => Some((name.clone(), *value as f64)),
+        PickleValue::Float(value) => Some((name.clone(), *value)),
+        _ => None,
+    };
+    let mut values: Vec<(String, f64)> = entries.iter().filter_map(number).collect();
+    values.sort_by(|a, b| a.0.cmp(&b.0));
+    values
 }
 
 /// The names of the joints; none if the file gives none.

@@ -62,7 +62,7 @@ fn add(path: &Path, recording: &mut Recording) -> McapResult<()> {
                 if !is_whole(opcode, data) {
                     return Err(McapError::UnexpectedEoc);
                 }
-                if [op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
+                if [op::SCHEMA, op::CHANNEL, op::MESSAGE, op::METADATA].contains(&opcode) {
                     add_record(parse_record(opcode, data)?, &mut channels, recording)?;
                 }
             }
@@ -83,6 +83,11 @@ fn is_whole(opcode: u8, data: &[u8]) -> bool {
             let about = fields(data).nth(2).flatten().unwrap_or_default();
             are_whole(data, 3) && are_whole(about, usize::MAX)
         }),
+        // Its name, and texts by name.
+        op::METADATA => {
+            let texts = fields(data).nth(1).flatten().unwrap_or_default();
+            are_whole(data, 2) && are_whole(texts, usize::MAX)
+        }
         _ => true,
     }
 }
@@ -119,6 +124,12 @@ fn add_record(
             let kind = channel.schema.as_ref().map_or("", |schema| &schema.name);
             let topic = recording.topic(&channel.topic, kind, &channel.message_encoding);
             recording.add(topic, header.log_time.cast_signed(), &data);
+        }
+        Record::Metadata(about) => {
+            let texts = about.metadata.into_iter();
+            let numbers = texts.filter_map(|(name, text)| Some((name, text.parse().ok()?)));
+            let is_finite = |(_, number): &(String, f64)| number.is_finite();
+            recording.values.extend(numbers.filter(is_finite));
         }
         _ => {}
     }

@@ -57,6 +57,8 @@ struct Recording {
     series: Vec<Series>,
     /// The indices of the series by topic and names.
     series_by_names: HashMap<(usize, Vec<String>), usize>,
+    /// Single numbers in what is said about the recording, by name.
+    values: Vec<(String, f64)>,
     notes: Vec<String>,
     /// For what is unpacked from the files, and for what is kept of it.
     unpacked: Budget,
@@ -116,6 +118,7 @@ impl Recording {
             topic_by_name: HashMap::new(),
             series: Vec::new(),
             series_by_names: HashMap::new(),
+            values: Vec::new(),
             notes: Vec::new(),
             unpacked: Budget::of(0),
             kept: Budget::of(0),

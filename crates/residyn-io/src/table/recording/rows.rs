@@ -27,6 +27,7 @@ impl Recording {
         let rows = &all[all.partition_point(|row| Some(row.ns) < known)..];
 
         let mut table = Arrays::of(self.kept.packed());
+        table.values.clone_from(&self.values);
         table.notes.extend(self.notes.iter().cloned());
         table.notes.push(self.time_message(chosen, clock));
         table
