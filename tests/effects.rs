@@ -135,6 +135,7 @@ fn friction_opposes_the_motion() {
         "asymmetric_friction",
         "quadratic_drag",
         "load_friction",
+        "gear_friction",
         "angle_friction",
     ];
     for name in frictions {

@@ -200,6 +200,7 @@ mod tests {
             hidden("degressive_friction", &[("F_d", 0.1), ("v_d", 0.2)]),
             hidden("quadratic_drag", &[("c", 0.1)]),
             hidden("load_friction", &[("k", 0.1)]),
+            hidden("gear_friction", &[("k_driving", 0.1), ("k_driven", 0.3)]),
             hidden("joint_spring", &[("k", 0.1), ("q_0", 0.0)]),
             hidden("gravity_tilt", &[("delta", 0.1)]),
             hidden("actuator_deadzone", &[("w", 0.1)]),

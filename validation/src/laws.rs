@@ -51,6 +51,14 @@ pub const DRY: &[Entry] = &[
         if at.direction > 0.0 { n[0] } else { n[1] }
     }),
     ("load_friction", &["k"], |n, at| n[0] * at.load.abs()),
+    ("gear_friction", &["k_driving", "k_driven"], |n, at| {
+        let is_driving = at.load * at.direction > 0.0;
+        if is_driving {
+            n[0] * at.load.abs()
+        } else {
+            n[1] * at.load.abs()
+        }
+    }),
     ("angle_friction", &["F_0", "c"], |n, at| {
         (n[0] + n[1] * at.q).max(0.0)
     }),
@@ -170,6 +178,8 @@ mod tests {
             ("asymmetric_friction", &[0.1, 0.2], forward, 0.1),
             ("asymmetric_friction", &[0.1, 0.2], backward, 0.2),
             ("load_friction", &[0.1], forward, 0.2),
+            ("gear_friction", &[0.1, 0.3], forward, 0.6),
+            ("gear_friction", &[0.1, 0.3], backward, 0.2),
             (
                 "uneven_friction",
                 &[0.1, 0.5],

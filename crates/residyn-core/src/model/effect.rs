@@ -530,6 +530,7 @@ mod tests {
             "coulomb_friction",
             "stribeck_friction",
             "load_friction",
+            "gear_friction",
             "actuator_delay",
             "actuator_gain",
             "rotor_inertia",
