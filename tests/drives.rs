@@ -552,6 +552,10 @@ rotor_inertia    | 4 | J = 0.01
             let is_held = holds(estimate, truth.parse().unwrap());
             assert!(is_held, "{name} {joint}: {estimate:?}");
         }
+        says(
+            &scratch.read("out/report.md"),
+            &["the scale of actuator_gain on joint 1: the logs with a known load tell it"],
+        );
     }
 
     const MOVED: &str = "

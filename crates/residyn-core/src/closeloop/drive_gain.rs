@@ -2,7 +2,7 @@
 //! torque, rather than another value of each.
 
 use crate::data::{Audit, Finding, Quantity, Severity};
-use crate::expr::{BASE, Unit};
+use crate::expr::is_of_torque;
 use crate::model::{Model, Parameter};
 
 /// Two values may share a factor by chance.
@@ -52,13 +52,6 @@ fn common_factor(declared: &[Parameter], fitted: &[Parameter]) -> Option<(f64, V
     let low = ends.iter().map(|[low, _]| *low).fold(f64::MIN, f64::max);
     let high = ends.iter().map(|[_, high]| *high).fold(f64::MAX, f64::min);
     (low <= high).then_some((0.5 * (low + high), names))
-}
-
-/// Whether a value in this unit is in proportion to the torques that it explains: a mass, an inertia, a friction.
-pub(super) fn is_of_torque(unit: &str) -> bool {
-    let mass = BASE.iter().position(|base| *base == "kg");
-    let exponents = Unit::parse(unit).map(Unit::exponents);
-    exponents.zip(mass).is_some_and(|(all, kg)| all[kg] == 1)
 }
 
 #[cfg(test)]

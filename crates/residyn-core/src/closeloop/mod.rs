@@ -40,6 +40,7 @@ mod prepare;
 mod problem;
 mod refine;
 mod request;
+mod scale_told;
 mod score;
 mod searched;
 mod select;

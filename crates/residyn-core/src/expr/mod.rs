@@ -33,4 +33,4 @@ pub use parse::{Formula, parse, parse_finite};
 
 pub use program::Program;
 pub use scope::{Scope, SignForm};
-pub use unit::{BASE, Unit};
+pub use unit::{BASE, Unit, is_of_torque};

@@ -26,6 +26,13 @@ const DERIVED: [(&str, [i32; 4]); 9] = [
 /// Units that are easier to read than their base units.
 const READABLE: [&str; 9] = ["1", "N", "N m", "W", "V", "V/A", "N m/A", "N m s", "N/m"];
 
+/// Whether a value in this unit is in proportion to the torques that it explains: a mass, an inertia, a friction.
+pub fn is_of_torque(unit: &str) -> bool {
+    let mass = BASE.iter().position(|base| *base == "kg");
+    let exponents = Unit::parse(unit).map(Unit::exponents);
+    exponents.zip(mass).is_some_and(|(all, kg)| all[kg] == 1)
+}
+
 impl Unit {
     /// The unit of pure numbers.
     pub const ONE: Self = Self([0; BASE.len()]);

@@ -8,7 +8,7 @@ use super::assemble::lower;
 use super::reader::{FileError, Located, Section};
 use super::system::{Equations, Model};
 use crate::data::{Joint, Log, Measured, Quantity, Smooth};
-use crate::expr::{Formula, Graph, Node, Program, Scope};
+use crate::expr::{Formula, Graph, Node, Program, Scope, is_of_torque};
 use crate::lanes::Row;
 
 /// The torque of each joint's drive, as formulas in the commands `cmd1..cmdn`, the measured motion `q1..`, `qd1..`, the
@@ -91,12 +91,39 @@ impl Model {
 
     /// Whether commands drive the joints by laws without a free parameter: the torques that they ask for are known.
     pub fn knows_law(&self) -> bool {
-        let is_free = |name: &str| {
-            let mut free = self.parameters.iter().filter(|own| !own.fixed);
-            free.any(|own| own.name == name)
+        self.equations.drive.is_some() && self.free_of_law().is_empty()
+    }
+
+    /// The free parameters of the laws by which commands drive the joints.
+    pub fn free_of_law(&self) -> Vec<usize> {
+        let mut of_law = self.of_law();
+        of_law.retain(|k| !self.parameters[*k].fixed);
+        of_law
+    }
+
+    /// The parameters of these laws.
+    fn of_law(&self) -> Vec<usize> {
+        let laws = self.equations.drive.iter().flat_map(Drive::formulas);
+        let names: Vec<&str> = laws.flat_map(|law| law.value.names()).collect();
+        let all = 0..self.parameters.len();
+        all.filter(|k| names.contains(&self.parameters[*k].name.as_str()))
+            .collect()
+    }
+
+    /// Whether the file gives this log another load than the others: a mass, a force or a torque with a value of its own, or
+    /// an effect that fits hold and that has one.
+    pub fn has_known_load(&self, log: &Log) -> bool {
+        let (values, of_law) = (self.values(), self.of_law());
+        let all = self.all_parameters();
+        let is_held = |k: usize| match self.parameters.get(k) {
+            Some(declared) => !declared.per_log && !of_law.contains(&k),
+            None => (0..self.effects.len())
+                .any(|e| self.effects[e].fixed && self.place_of(e).contains(&k)),
         };
-        let is_known = |law: &Located<Formula>| !law.value.names().into_iter().any(is_free);
-        (self.equations.drive.as_ref()).is_some_and(|drive| drive.formulas().iter().all(is_known))
+        (0..values.len()).any(|k| {
+            let is_other = || self.value_of(k, Some(log)) != values[k];
+            is_of_torque(&all[k].unit) && is_held(k) && is_other()
+        })
     }
 
     /// The names that formulas of `[drive]` may use.

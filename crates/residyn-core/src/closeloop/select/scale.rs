@@ -1,6 +1,6 @@
 use super::simpler::is_free_of;
-use crate::closeloop::drive_gain::is_of_torque;
 use crate::data::Joint;
+use crate::expr::is_of_torque;
 use crate::model::{FittedEffect, Model};
 
 /// Sets in which fewer drives have gains, and all forces have another scale: gains of some drives look like other gains of the

@@ -1,0 +1,160 @@
+//! What tells the scale of forces on a rig whose drives' gains are sought: twice the gain moves bodies of twice the mass, with
+//! twice the friction, in the same way.
+
+use nalgebra::DMatrix;
+
+use super::fitted::Fitted;
+use super::problem::Problem;
+use crate::data::{Audit, Finding, Log, Severity};
+use crate::decomposition::eigen;
+use crate::identify::with_unit_diagonal;
+use crate::model::Model;
+
+/// By how much wider an interval is without what tells its value.
+const WIDER: f64 = 2.0;
+
+/// A direction in which a share of the information this small is left is not known at all.
+const NOTHING: f64 = 1e-12;
+
+/// Report in the first log's audit what tells each gain of a drive, found or free, if the law of the drives gives the
+/// torques.
+pub(super) fn report_scale(problem: &Problem<'_>, fitted: &Fitted, audits: &mut [Audit]) {
+    let gains = gains(&fitted.model);
+    if !problem.is_by_law() || gains.is_empty() {
+        return;
+    }
+    let sources = Sources::of(problem, fitted);
+    for (source, text) in [
+        (Source::Load, "the logs with a known load tell it"),
+        (
+            Source::Bodies,
+            "only the declared bodies tell it: with others all forces would have another scale. A known load in some of \
+             the logs would tell it",
+        ),
+        (
+            Source::Drives,
+            "the logs tell it, by the drives whose gains are held",
+        ),
+    ] {
+        let is_told = |(_, parameter): &&(String, usize)| {
+            let columns = fitted.fit.columns_of(|own| own == *parameter);
+            columns
+                .first()
+                .is_some_and(|column| sources.of_column(*column) == source)
+        };
+        let told = gains.iter().filter(is_told);
+        let names: Vec<&str> = told.map(|(name, _)| name.as_str()).collect();
+        if let (false, Some(audit)) = (names.is_empty(), audits.first_mut()) {
+            let text = format!("the scale of {}: {text}", names.join(", "));
+            audit.add(Finding::new(Severity::Info, text));
+        }
+    }
+}
+
+/// The gains that a fit of the model finds, and their places among its parameters.
+fn gains(model: &Model) -> Vec<(String, usize)> {
+    let of_law = model.free_of_law().into_iter();
+    let of_law = of_law.map(|k| (model.parameters[k].name.clone(), k));
+    let effects = model.effects.iter().enumerate();
+    let of_effects = effects.filter_map(|(k, own)| {
+        let values: Vec<f64> = own.values.iter().map(|(value, _)| *value).collect();
+        let is_gain = !own.fixed && own.effect.gain(&values).is_some();
+        let name = || format!("{} on joint {}", own.effect.name, own.joint);
+        is_gain.then(|| (name(), model.place_of(k).start))
+    });
+    of_law.chain(of_effects).collect()
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Source {
+    Load,
+    Bodies,
+    Drives,
+}
+
+/// Information on the free values of a fit, with and without what may tell the scale.
+struct Sources {
+    all: DMatrix<f64>,
+    /// None if no log has a known load.
+    without_load: Option<DMatrix<f64>>,
+    without_bodies: DMatrix<f64>,
+}
+
+impl Sources {
+    fn of(problem: &Problem<'_>, fitted: &Fitted) -> Self {
+        let is_loaded = |log: &Log| usize::from(problem.declared.has_known_load(log));
+        let loaded: Vec<usize> = problem.logs.iter().map(is_loaded).collect();
+        let windows = problem.shooting.windows.iter();
+        let groups: Vec<usize> = windows.map(|window| loaded[window.log]).collect();
+        let by_load = fitted.fit.equations_by(&groups);
+        let all = fitted.fit.information();
+        let (logs, bodies) = (fitted.fit.equations().hessian, &all);
+        let bodies = bodies - &logs;
+        Self {
+            without_load: (by_load.len() == 2).then(|| &by_load[0].hessian + &bodies),
+            without_bodies: logs,
+            all,
+        }
+    }
+
+    /// What tells a free value.
+    fn of_column(&self, column: usize) -> Source {
+        let is_wider = |without: &DMatrix<f64>| {
+            variance(without, column) > WIDER * WIDER * variance(&self.all, column)
+        };
+        if self.without_load.as_ref().is_some_and(is_wider) {
+            Source::Load
+        } else if is_wider(&self.without_bodies) {
+            Source::Bodies
+        } else {
+            Source::Drives
+        }
+    }
+}
+
+/// The variance of a free value, the others unknown; infinite if this information does not tell it.
+fn variance(information: &DMatrix<f64>, column: usize) -> f64 {
+    let (scaled, unit) = with_unit_diagonal(information);
+    let Some(eigen) = eigen(scaled) else {
+        return f64::INFINITY;
+    };
+    let parts = eigen.eigenvalues.iter().enumerate();
+    let parts =
+        parts.map(|(k, value)| eigen.eigenvectors[(column, k)].powi(2) / value.max(NOTHING));
+    parts.sum::<f64>() * unit[column].powi(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::{Source, Sources};
+
+    /// A gain and a mass of which the logs show the ratio alone.
+    fn ratio() -> DMatrix<f64> {
+        DMatrix::from_row_slice(2, 2, &[100.0, -100.0, -100.0, 100.0])
+    }
+
+    fn knowing(gain: f64, mass: f64) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&vec![gain, mass].into())
+    }
+
+    #[test]
+    fn what_is_wide_without_it_tells_the_scale() {
+        let bodies = knowing(0.0, 1.0);
+        let told = |by_logs: DMatrix<f64>, without_load: Option<DMatrix<f64>>| {
+            let sources = Sources {
+                all: &by_logs + &bodies,
+                without_load: without_load.map(|logs| logs + &bodies),
+                without_bodies: by_logs,
+            };
+            sources.of_column(0)
+        };
+        assert_eq!(told(ratio(), None), Source::Bodies);
+        let loaded = ratio() + knowing(0.0, 50.0);
+        assert_eq!(told(loaded.clone(), Some(ratio())), Source::Load);
+        // A load that adds nothing, on logs that know the gain already.
+        assert_eq!(told(loaded.clone(), Some(loaded)), Source::Drives);
+        assert_eq!(told(ratio() + knowing(50.0, 0.0), None), Source::Drives);
+    }
+}
