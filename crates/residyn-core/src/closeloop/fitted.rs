@@ -26,6 +26,14 @@ impl Fitted {
         }
     }
 
+    /// The same without the normal equations of each window.
+    pub(super) fn without_windows(self) -> Self {
+        Self {
+            fit: self.fit.without_windows(),
+            ..self
+        }
+    }
+
     /// The cost of the fit in units of the squared noise: the fit states it in units of its squared scale.
     pub(super) fn loss(&self) -> f64 {
         self.fit.cost * self.fit.scale.powi(2)

@@ -1,13 +1,15 @@
 //! A search limb by limb: joints of one limb do not move those of another, so that each limb is a smaller problem of its
 //! own.
 
+use std::sync::{Arc, OnceLock};
+
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::alike::{Part, agree};
 use super::command_path;
-use super::diagnostics::diagnose;
+use super::diagnostics::{Probed, diagnose_in_parts};
 use super::error::StudyError;
 use super::error_model::ErrorModel;
 use super::establish::{Chosen, Standing};
@@ -51,17 +53,25 @@ pub(super) fn find_in_limbs<'a>(
     let mut parts: Vec<Part<'_>> = parts.collect::<Result<_, StudyError>>()?;
     agree(problem.declared, &mut parts, watch);
     let judged = parts.into_par_iter().zip(&limbs).zip(&mut draws);
-    let found = judged.map(|((part, limb), rng)| part.searched.judged(&limb.apart, rng));
-    let found: Vec<Found<'_>> = found.collect();
+    let found = judged.map(|((mut part, limb), rng)| {
+        let probes = part.searched.left(rng).probes.iter();
+        let probes = probes.map(|probed| probed.on(part.joints[probed.joint]));
+        (probes.collect(), part.searched.judged(&limb.apart, rng))
+    });
+    let (probed, found): (Vec<Vec<Probed>>, Vec<Found<'_>>) = found.unzip();
     let whole = Whole {
         declared,
         limbs: limbs.iter().zip(&found).collect(),
     };
     let chosen = whole.chosen()?;
     let before = declared.fitted.clone();
+    let knowing = Problem {
+        usual: Arc::new(OnceLock::from(whole.usual())),
+        ..problem.knowing(problem.identifiability_of(&chosen.after))
+    };
     Ok(Some(Found {
-        unexplained: diagnose(problem, &before, &chosen.after, rng),
-        problem: problem.knowing(problem.identifiability_of(&chosen.after)),
+        unexplained: diagnose_in_parts(problem, &before, &chosen.after, probed.concat(), rng),
+        problem: knowing,
         gravity: shares_of_gravity(problem),
         before,
         chosen,
@@ -201,27 +211,56 @@ impl Whole<'_, '_> {
 
     /// The whole with what was found in each limb; with another model of limb `other`, if there is one.
     fn with(&self, other: Option<(usize, &Model)>) -> Model {
+        let limbs = self.limbs.iter().enumerate();
+        self.of_limbs(limbs.map(|(k, (limb, found))| {
+            let other = other.filter(|(other, _)| *other == k);
+            (
+                *limb,
+                other.map_or(&found.chosen.after.model, |(_, model)| model),
+            )
+        }))
+    }
+
+    /// The declared model with the values and effects of a model of each limb.
+    fn of_limbs<'m>(&self, limbs: impl Iterator<Item = (&'m Limb, &'m Model)>) -> Model {
         let mut whole = self.declared.fitted.model.clone();
         let mut added = Vec::new();
-        for (k, (limb, found)) in self.limbs.iter().enumerate() {
-            let model = other.filter(|(other, _)| *other == k);
-            let model = model.map_or(&found.chosen.after.model, |(_, model)| model);
+        for (limb, model) in limbs {
             added.extend(limb.put_into(&mut whole, model));
         }
         let effects = [whole.effects.as_slice(), &added].concat();
         whole.with_effects(effects)
     }
 
-    /// The whole with another model of limb `k`, at the scale of the chosen one.
+    /// The whole with another model of limb `k`, at the scale of the chosen one. Its windows' normal equations are not kept:
+    /// there is one such model for each effect.
     fn other(&self, k: usize, other: &Fitted, after: &Fitted) -> Result<Fitted, FitError> {
+        let other = self.as_it_stands(&self.with(Some((k, &other.model))), after)?;
+        Ok(other.without_windows())
+    }
+
+    /// A model of the whole at the scale of another.
+    fn as_it_stands(&self, model: &Model, scaled: &Fitted) -> Result<Fitted, FitError> {
         let problem = &self.declared.problem;
-        let model = problem.smoothed(&self.with(Some((k, &other.model))));
+        let model = problem.smoothed(model);
         let dynamics = problem.compiled(&model);
         let active = problem.active(&dynamics);
-        let start_states = after.fit.start_states.clone();
-        let scale = after.fit.scale;
+        let start_states = scaled.fit.start_states.clone();
+        let scale = scaled.fit.scale;
         let fit = as_it_stands(&problem.shooting, &dynamics, &active, start_states, scale)?;
         Ok(Fitted { model, fit })
+    }
+
+    /// The declared model with the usual friction, as it was fitted in each limb; `None` if it diverges in one.
+    fn usual(&self) -> Option<Fitted> {
+        let fitted = self
+            .limbs
+            .par_iter()
+            .map(|(_, found)| found.problem.with_usual_friction());
+        let fitted: Vec<Fitted> = fitted.collect::<Option<_>>()?;
+        let limbs = self.limbs.iter().zip(&fitted);
+        let model = self.of_limbs(limbs.map(|((limb, _), fitted)| (*limb, &fitted.model)));
+        self.as_it_stands(&model, &self.declared.fitted).ok()
     }
 
     fn standing(&self, k: usize, standing: &Standing, after: &Fitted) -> Standing {

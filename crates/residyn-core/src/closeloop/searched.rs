@@ -83,12 +83,16 @@ impl<'a> Searched<'a> {
         self
     }
 
+    /// What the chosen model leaves.
+    pub fn left(&mut self, rng: &mut impl Rng) -> &Unexplained {
+        let left = self.left.take();
+        let left = left.unwrap_or_else(|| self.diagnose(rng));
+        self.left.insert(left)
+    }
+
     /// Judge each effect, and test the residuals.
-    pub fn judged(self, apart: &[Log], rng: &mut impl Rng) -> Found<'a> {
-        let left = match self.left {
-            Some(left) => left,
-            None => self.diagnose(rng),
-        };
+    pub fn judged(mut self, apart: &[Log], rng: &mut impl Rng) -> Found<'a> {
+        let left = self.left(rng).clone();
         judge(self.declared, self.chosen, left, apart, rng)
     }
 

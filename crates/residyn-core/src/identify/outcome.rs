@@ -58,6 +58,16 @@ impl Fit {
         all.filter(|&i| is_one(self.columns[i].parameter)).collect()
     }
 
+    /// The same without the normal equations of each window, which are most of its memory: for models that are compared by
+    /// what has been computed from them.
+    #[must_use]
+    pub(crate) fn without_windows(self) -> Self {
+        Self {
+            reduced: Vec::new(),
+            ..self
+        }
+    }
+
     /// Zero normal equations in the free values.
     pub fn zero_equations(&self) -> WindowTerms {
         WindowTerms::zeros(self.columns.len())

@@ -15,4 +15,5 @@ pub(super) use self::force::residual_force;
 pub use self::omnibus::Omnibus;
 pub use self::proposal::{Proposal, proposal};
 pub use self::residual::ResidualForce;
+pub(super) use self::unexplained::diagnose_in_parts;
 pub use self::unexplained::{Probed, UNKNOWN, Unexplained, diagnose, unexplained};

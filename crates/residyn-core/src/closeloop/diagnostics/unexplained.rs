@@ -48,11 +48,44 @@ pub struct Probed {
     pub gain: f64,
 }
 
+impl Probed {
+    /// The same on another joint, under its number.
+    #[must_use]
+    pub(in crate::closeloop) fn on(&self, joint: Joint) -> Self {
+        let renamed = |name: &str| match name.strip_suffix(&self.joint.to_string()) {
+            Some(stem) if !is_measured(name) => joint.name(stem),
+            _ => name.to_owned(),
+        };
+        let names: Vec<String> = self.place.split('*').map(renamed).collect();
+        Self {
+            place: names.join("*"),
+            joint,
+            ..self.clone()
+        }
+    }
+}
+
 /// The unexplained residual depends on none of the variables tested.
 pub const UNKNOWN: &str = "unknown";
 const NONE: &str = "none";
 
 impl Unexplained {
+    fn of(problem: &Problem<'_>, omnibus: Omnibus, probed: Vec<Probed>) -> Self {
+        let asked = probed.len().max(1) as f64;
+        let noteworthy = problem.settings.diagnostics.noteworthy_share;
+        let seen = probed.iter().filter(|p| p.gain > noteworthy);
+        let least = seen.map(|p| p.p_value).fold(1.0, f64::min);
+        let (place, joint) = place(problem, &omnibus, &probed);
+        Self {
+            fraction: omnibus.fraction,
+            p_value: (2.0 * omnibus.p_value.min(least * asked)).min(1.0),
+            place,
+            joint,
+            omnibus,
+            probes: probed,
+        }
+    }
+
     pub fn is_significant(&self) -> bool {
         self.place != NONE
     }
@@ -92,6 +125,22 @@ pub fn unexplained(
     rng: &mut impl Rng,
 ) -> Unexplained {
     let omnibus = omnibus(problem, before, after, rng);
+    Unexplained::of(problem, omnibus, probed(problem, probes, after))
+}
+
+/// As [`diagnose`], with the probes of parts of the rig that were asked on their own.
+pub(in crate::closeloop) fn diagnose_in_parts(
+    problem: &Problem<'_>,
+    before: &Fitted,
+    after: &Fitted,
+    probed: Vec<Probed>,
+    rng: &mut impl Rng,
+) -> Unexplained {
+    Unexplained::of(problem, omnibus(problem, before, after, rng), probed)
+}
+
+/// What each probe of a model does.
+fn probed(problem: &Problem<'_>, probes: &[Effect], after: &Fitted) -> Vec<Probed> {
     let losses = Losses::by(problem, &Folds::of(problem).alone(), after);
     let of_library = (after, acting(problem, probes));
     let of_columns = measured_probes(problem, after);
@@ -103,24 +152,8 @@ pub fn unexplained(
         let ask = |probe| ask(problem, model, probe, &losses);
         probes.filter_map(ask).collect()
     };
-    let probed: Vec<Probed> = [of_library]
-        .into_iter()
-        .chain(of_columns)
-        .flat_map(asked)
-        .collect();
-    let asked = probed.len().max(1) as f64;
-    let noteworthy = problem.settings.diagnostics.noteworthy_share;
-    let seen = probed.iter().filter(|p| p.gain > noteworthy);
-    let least = seen.map(|p| p.p_value).fold(1.0, f64::min);
-    let (place, joint) = place(problem, &omnibus, &probed);
-    Unexplained {
-        fraction: omnibus.fraction,
-        p_value: (2.0 * omnibus.p_value.min(least * asked)).min(1.0),
-        place,
-        joint,
-        omnibus,
-        probes: probed,
-    }
+    let all = [of_library].into_iter().chain(of_columns);
+    all.flat_map(asked).collect()
 }
 
 fn ask(

@@ -7,7 +7,6 @@ use crate::closeloop::establish::{Chosen, Standing};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::refine::Refined;
-use crate::closeloop::select::{Losses, p_of_gains};
 use crate::digits::amount_of;
 use crate::identify::FitError;
 use crate::model::{FittedEffect, Model, Parameter, PerLogValue, Status};
@@ -83,16 +82,12 @@ pub(in crate::closeloop) fn findings(
         let less = &standing.without;
         let error = |less: &Fitted| scorer.compared(problem.error_model, less);
         let reduction = |less: &Fitted| 1.0 - with / error(less).max(f64::MIN_POSITIVE);
-        // The signed-rank p-value of the falls of the loss.
-        let losses = |model| Losses::of(problem, model).of_effect(&standing.effect);
-        let p_of_refit = |less| p_of_gains(&losses(less), &losses(chosen));
-        let of_refit = || less.as_ref().map_or(1.0, p_of_refit);
         let (expression, parameters) = described(problem.declared, &refined.after.model, k);
         Finding {
             effect: refined.after.model.effects[k].clone(),
             expression,
             parameters,
-            p_value: refined.p_value(k).unwrap_or_else(of_refit),
+            p_value: refined.p_value(k).unwrap_or(standing.p_value),
             error_reduction: less.as_ref().map(reduction).map_err(Clone::clone),
             status: standing.status,
             reason: standing.reason.clone(),

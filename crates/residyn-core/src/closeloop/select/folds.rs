@@ -80,20 +80,17 @@ pub fn left_out_losses(folds: &Folds, fit: &Fit) -> Vec<f64> {
     let steps = steps_without(folds, fit);
     let blocks = fit.equations_by(&folds.blocks);
     let loss = |(part, &group): (&WindowTerms, &usize)| {
-        predicted(part.cost, &part.gradient, &part.hessian, &steps[group])
+        let step = &steps[group];
+        let curvature = step.dot(&(&part.hessian * step));
+        predicted(part.cost, part.gradient.dot(step), curvature)
     };
     blocks.iter().zip(&folds.groups).map(loss).collect()
 }
 
-/// The loss after a step, taken as quadratic. Sums of squares are never negative: a loss far below zero is rounding,
+/// The loss after a step along which it has this slope and curvature. Sums of squares are never negative: a loss far below zero is rounding,
 /// from a step along an undetermined value, and is unknown.
-pub fn predicted(
-    cost: f64,
-    gradient: &DVector<f64>,
-    hessian: &DMatrix<f64>,
-    step: &DVector<f64>,
-) -> f64 {
-    let loss = cost + gradient.dot(step) + 0.5 * step.dot(&(hessian * step));
+pub fn predicted(cost: f64, slope: f64, curvature: f64) -> f64 {
+    let loss = cost + slope + 0.5 * curvature;
     match loss < -cost {
         true => f64::INFINITY,
         false => loss.max(0.0),
@@ -121,7 +118,21 @@ pub fn step_without(
     gradient: &DVector<f64>,
     kept_information: f64,
 ) -> DVector<f64> {
-    // Relative units, so that a parameter in N m s/rad weighs as much as one in 1/s^2.
+    let (rest, unit) = known_without(all, part, kept_information);
+    let Some(factor) = rest.cholesky() else {
+        return DVector::zeros(unit.len());
+    };
+    let step = factor.solve(&gradient.component_mul(&unit));
+    step.component_mul(&unit)
+}
+
+/// The information that is left without a part of the windows, and the share that is kept, in the units that it returns:
+/// relative ones, so that a parameter in N m s/rad weighs as much as one in 1/s^2.
+pub fn known_without(
+    all: &DMatrix<f64>,
+    part: &DMatrix<f64>,
+    kept_information: f64,
+) -> (DMatrix<f64>, DVector<f64>) {
     let (_, unit) = with_unit_diagonal(all);
     let rest = DMatrix::from_fn(unit.len(), unit.len(), |i, j| {
         let known = (all[(i, j)] - part[(i, j)]) * unit[i] * unit[j];
@@ -131,9 +142,5 @@ pub fn step_without(
             known
         }
     });
-    let Some(factor) = rest.cholesky() else {
-        return DVector::zeros(unit.len());
-    };
-    let step = factor.solve(&gradient.component_mul(&unit));
-    step.component_mul(&unit)
+    (rest, unit)
 }

@@ -1,19 +1,17 @@
 //! Which effects a fit distinguishes from the rest of its model.
 
-use nalgebra::DMatrix;
-
-use super::equations::own_shares;
+use super::equations::Eliminated;
 use crate::closeloop::problem::Problem;
 use crate::data::Quantity;
-use crate::identify::{Fit, submatrix};
+use crate::identify::Fit;
 use crate::model::Model;
 
-/// What is known of a fit's values, and how much of it an effect needs for its own.
+/// What is known of a fit's values beside some of them, the base, and how much of it an effect needs for its own.
 pub struct Knowledge {
-    /// Information of the logs alone.
-    logs: DMatrix<f64>,
+    /// Information of the logs alone; `None` if it does not determine the base.
+    logs: Option<Eliminated>,
     /// The same with that of the bodies' declaration, if it counts for some value.
-    all: Option<DMatrix<f64>>,
+    all: Option<Option<Eliminated>>,
     /// Which values belong to effects that most machines have.
     usual: Vec<bool>,
     /// The share of the information on an effect that must be independent of the rest.
@@ -21,7 +19,7 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    pub fn of(problem: &Problem<'_>, model: &Model, fit: &Fit) -> Self {
+    pub fn of(problem: &Problem<'_>, model: &Model, fit: &Fit, base: &[usize]) -> Self {
         // A drive that closes a loop of its own is a geared motor, whose file is about the links.
         let is_geared = problem.declared.driven_by() == Quantity::Command;
         let usual = |k: &usize| is_geared && model.effects[*k].effect.baseline.is_some();
@@ -32,20 +30,19 @@ impl Knowledge {
         let columns = fit.columns.iter();
         let usual: Vec<bool> = columns.map(|column| is_usual(column.parameter)).collect();
         Self {
-            logs: fit.equations().hessian,
-            all: usual.contains(&true).then(|| fit.information()),
+            logs: Eliminated::ridged(&fit.equations().hessian, base),
+            all: (usual.contains(&true)).then(|| Eliminated::ridged(&fit.information(), base)),
             usual,
             least: problem.settings.select.own_information,
         }
     }
 
-    /// Whether these values, after the first `base` of them, are distinguished from each other and from those. What only
+    /// Whether these values are distinguished from each other and from the base. What only
     /// the declared bodies distinguish from errors of theirs, as a rotor next to a link, is distinguished on a rig that
     /// commands drive if most machines have it: anything else would be an error of the bodies under another name.
-    pub fn distinguishes(&self, columns: &[usize], base: usize) -> bool {
-        let own = &columns[base..];
-        let suffices = |of: &DMatrix<f64>, for_usual: bool| {
-            let shares = own_shares(&submatrix(of, columns, columns), base);
+    pub fn distinguishes(&self, own: &[usize]) -> bool {
+        let suffices = |of: &Option<Eliminated>, for_usual: bool| {
+            let shares = of.as_ref().and_then(|of| of.own_shares(own));
             shares.is_some_and(|shares| {
                 let mut own = own.iter().zip(shares);
                 own.all(|(i, share)| self.usual[*i] != for_usual || share > self.least)

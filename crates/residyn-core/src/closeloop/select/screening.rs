@@ -1,11 +1,11 @@
-use std::ops::{AddAssign, Range};
+use std::ops::Range;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::candidate::{beside, best_start, has_switch, screened_cost_on_sample, switches};
-use super::equations::solve;
-use super::folds::{Folds, predicted, step_without};
+use super::equations::{Eliminated, solve};
+use super::folds::{Folds, known_without, predicted, step_without};
 use super::knowledge::Knowledge;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
@@ -22,9 +22,8 @@ pub struct Screening {
     present: usize,
     /// The free values of each item.
     columns_of: Vec<Vec<usize>>,
-    /// Free values that belong to no item; then those of them that the logs determine.
+    /// Free values that belong to no item.
     base: Vec<usize>,
-    message: Vec<usize>,
     /// Distance of each free value to its bounds; then to being switched off.
     room: Vec<[f64; 2]>,
     to_zero: Vec<f64>,
@@ -32,6 +31,9 @@ pub struct Screening {
     blocks: Vec<WindowTerms>,
     groups: Vec<WindowTerms>,
     all: WindowTerms,
+    /// The equations of all windows, and of those without each group, the base eliminated; `None` if they do not determine it.
+    of_all: Option<Eliminated>,
+    without: Vec<Option<Eliminated>>,
     /// What the declared values say, where they count as in a [`Trial`](super::Trial).
     declared: Option<WindowTerms>,
     knowledge: Knowledge,
@@ -93,23 +95,31 @@ impl Screening {
         let is_base = |k: usize| !places.iter().any(|place| place.contains(&k));
         let folds = Folds::of(problem);
         let (blocks, groups) = folds.equations(&fit);
+        let (all, base) = (fit.equations_and_prior(), fit.columns_of(is_base));
+        let kept = problem.settings.select.kept_information;
+        let without = groups.par_iter().map(|group| {
+            let rest = known_without(&all.hessian, &group.hessian, kept);
+            Eliminated::of(rest, &base)
+        });
+        let determined = fit.columns_of(|k| is_base(k) && problem.is_identifiable(k));
         Some(Self {
+            without: without.collect(),
+            of_all: Eliminated::ridged(&all.hessian, &base),
             items: model.effects[added].to_vec(),
             present,
             columns_of: (places.iter())
                 .map(|place| fit.columns_of(|k| place.contains(&k)))
                 .collect(),
-            base: fit.columns_of(is_base),
-            message: fit.columns_of(|k| is_base(k) && problem.is_identifiable(k)),
+            base,
             room: fit.columns.iter().map(room).collect(),
             to_zero: fit.columns.iter().map(to_zero).collect(),
             groups_of: folds.groups,
             blocks,
             groups,
-            all: fit.equations_and_prior(),
+            all,
             declared: problem.is_by_law().then(|| fit.declared_values()),
-            knowledge: Knowledge::of(problem, &model, &fit),
-            kept_information: problem.settings.select.kept_information,
+            knowledge: Knowledge::of(problem, &model, &fit, &determined),
+            kept_information: kept,
         })
     }
 
@@ -129,22 +139,16 @@ impl Screening {
         let minimum = self.minimum(set)?;
         let (free, moved) = (&minimum.free, &minimum.moved);
         let rows: Vec<usize> = [free.as_slice(), moved].concat();
-        let at = self.step(&minimum)?.select_rows(&rows);
-        let all = submatrix(&self.all.hessian, free, free);
-        let without = |group: &WindowTerms| {
-            let own = submatrix(&group.hessian, free, free);
-            let gradient =
-                group.gradient.select_rows(free) + submatrix(&group.hessian, free, &rows) * &at;
-            let step = step_without(&all, &own, &gradient, self.kept_information);
-            let mut there = at.clone();
-            there.rows_mut(0, free.len()).add_assign(&step);
-            there
-        };
-        let steps: Vec<DVector<f64>> = self.groups.iter().map(without).collect();
+        let at = self.step(&minimum)?;
+        let steps = (0..self.groups.len()).map(|group| {
+            let there = &self.groups[group];
+            let gradient = &there.gradient + times(&there.hessian, free, &rows, &at);
+            &at + self.step_without(group, &minimum, &gradient)
+        });
+        let steps: Vec<DVector<f64>> = steps.collect();
         let loss = |part: &WindowTerms, step: &DVector<f64>| {
-            let gradient = part.gradient.select_rows(&rows);
-            let hessian = submatrix(&part.hessian, &rows, &rows);
-            predicted(part.cost, &gradient, &hessian, step)
+            let curvature = step.dot(&times(&part.hessian, &rows, &rows, step));
+            predicted(part.cost, part.gradient.dot(step), curvature)
         };
         let blocks = self.blocks.iter().zip(&self.groups_of);
         let of_logs: f64 = blocks.map(|(part, &group)| loss(part, &steps[group])).sum();
@@ -168,8 +172,7 @@ impl Screening {
             }
         }
         let mut minimum = Minimum { free, held, moved };
-        let message = [&self.message, &minimum.free[self.base.len()..]].concat();
-        if !(self.knowledge).distinguishes(&message, self.message.len()) {
+        if !self.knowledge.distinguishes(minimum.chosen(&self.base)?) {
             return None;
         }
         loop {
@@ -194,15 +197,88 @@ impl Screening {
     /// The displacement of all values at the minimum of the loss.
     fn step(&self, minimum: &Minimum) -> Option<DVector<f64>> {
         let Minimum { free, held, moved } = minimum;
-        let matrix = submatrix(&self.all.hessian, free, free);
-        let displaced = submatrix(&self.all.hessian, free, moved) * held.select_rows(moved);
-        let solution = solve(&matrix, &(self.all.gradient.select_rows(free) + displaced))?;
-        let mut step = held.clone();
-        for (&i, value) in free.iter().zip(solution.iter()) {
-            step[i] = -value;
-        }
-        Some(step)
+        let right = &self.all.gradient + times(&self.all.hessian, free, moved, held);
+        let solution = match minimum.chosen(&self.base) {
+            Some(chosen) => self.of_all.as_ref()?.solve(chosen, &right)?,
+            None => {
+                let matrix = submatrix(&self.all.hessian, free, free);
+                among(
+                    free,
+                    right.len(),
+                    &solve(&matrix, &right.select_rows(free))?,
+                )
+            }
+        };
+        Some(held - solution)
     }
+
+    /// The step of the free values of a minimum without a group of windows, which have this gradient there.
+    fn step_without(
+        &self,
+        group: usize,
+        minimum: &Minimum,
+        gradient: &DVector<f64>,
+    ) -> DVector<f64> {
+        let (free, size) = (&minimum.free, gradient.len());
+        if let Some(chosen) = minimum.chosen(&self.base) {
+            let known = self.without[group].as_ref();
+            let step = known.and_then(|known| known.solve(chosen, gradient));
+            return step.unwrap_or_else(|| DVector::zeros(size));
+        }
+        let [all, own] = [&self.all, &self.groups[group]];
+        let [all, own] = [all, own].map(|terms| submatrix(&terms.hessian, free, free));
+        let gradient = gradient.select_rows(free);
+        let step = step_without(&all, &own, &gradient, self.kept_information);
+        among(free, size, &step)
+    }
+}
+
+impl Minimum {
+    /// The free values after those of the base, if all of that is free.
+    fn chosen(&self, base: &[usize]) -> Option<&[usize]> {
+        self.free.strip_prefix(base)
+    }
+}
+
+/// A part of a matrix times that of a vector, in the order of all values, the others zero.
+fn times(
+    matrix: &DMatrix<f64>,
+    rows: &[usize],
+    columns: &[usize],
+    vector: &DVector<f64>,
+) -> DVector<f64> {
+    let (mut product, size) = (vec![0.0; vector.len()], matrix.nrows());
+    let runs = runs(rows);
+    for &column in columns {
+        let factor = vector[column];
+        let values = &matrix.as_slice()[size * column..][..size];
+        for run in &runs {
+            let both = product[run.clone()].iter_mut().zip(&values[run.clone()]);
+            both.for_each(|(sum, value)| *sum += factor * value);
+        }
+    }
+    product.into()
+}
+
+/// Places as ranges of places that follow each other: most do.
+fn runs(places: &[usize]) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for &place in places {
+        match runs.last_mut() {
+            Some(run) if run.end == place => run.end += 1,
+            _ => runs.push(place..place + 1),
+        }
+    }
+    runs
+}
+
+/// Values at these places, zero at the others.
+fn among(places: &[usize], size: usize, values: &DVector<f64>) -> DVector<f64> {
+    let mut all = DVector::zeros(size);
+    for (&place, value) in places.iter().zip(values.iter()) {
+        all[place] = *value;
+    }
+    all
 }
 
 /// The candidates that are compared at once: all or, if memory does not suffice, those with the largest predicted gain

@@ -195,8 +195,12 @@ impl<'a> Search<'a> {
     /// scale if the loss at the new one is unknown. An effect whose values have moved to a bound is replaced by the
     /// effects that it contains: no set with it would be valid from then on.
     fn estimated(&self, trial: Trial) -> Result<Trial, FitError> {
-        let anew = Trial::of(self.problem, self.problem.estimate(&trial.fitted)?);
-        let anew = if anew.loss().is_finite() { anew } else { trial };
+        let (problem, Fitted { model, fit }) = (self.problem, trial.fitted);
+        let at = |scale| problem.refit(&model, fit.start_states.clone(), scale);
+        let mut anew = Trial::of(problem, at(None)?);
+        if !anew.loss().is_finite() {
+            anew = Trial::of(problem, at(Some(fit.scale))?);
+        }
         match self.repaired_from(&anew, f64::INFINITY) {
             Some(simpler) => self.estimated(simpler),
             None => Ok(anew),
@@ -295,10 +299,12 @@ impl<'a> Search<'a> {
         first_of_each(&mut sets, vec![from.added_key(problem)], key);
         let trial = |set: Vec<FittedEffect>| {
             let found = self.fitted_from(from, &set, below)?;
-            if found.is_valid(problem) {
-                return Some(found);
-            }
-            self.repaired_from(&found, below)
+            let valid = match found.is_valid(problem) {
+                true => found,
+                false => self.repaired_from(&found, below)?,
+            };
+            // There may be hundreds.
+            Some(valid.without_windows())
         };
         let (of, done) = (sets.len(), AtomicUsize::new(0));
         self.report_fitted(0, of);
@@ -358,8 +364,7 @@ impl<'a> Search<'a> {
             let exchanges = exchanges(problem, &current.fitted);
             sets.extend(exchanges.into_iter().map(|exchange| exchange.set));
             sets.extend(at_other_scales(problem.declared, &effects[declared..]));
-            let without = |k: usize| [&effects[declared..k], &effects[k + 1..]].concat();
-            sets.extend(added.map(without));
+            sets.extend(self.without_one(&current, best));
             let good = self.as_good_as(best, &current, sets);
             let is_simpler = |trial: &Trial| trial.values() < current.values();
             let (mut good, mut other): (Vec<_>, Vec<_>) = good.into_iter().partition(is_simpler);
@@ -389,22 +394,45 @@ impl<'a> Search<'a> {
         let Some(screening) = Screening::of(problem, &trial.fitted, &[]) else {
             return trial.clone();
         };
-        let settings = &problem.settings.select;
-        let within = |set: &Vec<usize>| {
-            let loss = screening.loss(set).unwrap_or(f64::INFINITY);
-            loss <= best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
-        };
         let all = screening.present();
         let mut unshifted = all.clone();
         unshifted.retain(|&item| screening.items[item].shifted().is_none());
         let mut sets: Vec<_> = [descent(&screening, all), vec![unshifted.clone()]].concat();
         sets.extend(descent(&screening, unshifted));
-        sets.retain(within);
-        let sets = sets.iter().map(|set| screening.effects(set)).collect();
-        let good = self.as_good_as(best, trial, sets);
+        sets.retain(|set| self.is_promising(&screening, set, best));
+        let mut sets: Vec<_> = sets.iter().map(|set| screening.effects(set)).collect();
+        let shifts =
+            |set: &[FittedEffect]| set.iter().filter(|own| own.shifted().is_some()).count();
+        sets.sort_by_key(|set| (set.len(), shifts(set)));
+        // The smallest that is as good is wanted: larger ones need no fit.
+        let few = sets.chunks(rayon::current_num_threads());
+        let mut good = few.map(|few| self.as_good_as(best, trial, few.to_vec()));
+        let good = good.find(|good| !good.is_empty()).unwrap_or_default();
         let size = |trial: &Trial| (trial.fitted.model.effects.len(), trial.shifts());
         let least = good.into_iter().min_by_key(size);
         least.unwrap_or_else(|| trial.clone())
+    }
+
+    /// Whether a set may explain the logs as well as the best one, as its predicted loss has it.
+    fn is_promising(&self, screening: &Screening, set: &[usize], best: &Trial) -> bool {
+        let settings = &self.problem.settings.select;
+        let loss = screening.loss(set).unwrap_or(f64::INFINITY);
+        loss <= best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
+    }
+
+    /// The sets without one of a trial's effects that may explain the logs as well as the best one.
+    fn without_one(&self, trial: &Trial, best: &Trial) -> Vec<Vec<FittedEffect>> {
+        let screening = Screening::of(self.problem, &trial.fitted, &[]);
+        let added = trial.added(self.problem);
+        let is_promising = |k: &usize| {
+            let all = 0..added.len();
+            let set: Vec<usize> = all.filter(|other| other != k).collect();
+            let predicted = screening.as_ref();
+            predicted.is_none_or(|screening| self.is_promising(screening, &set, best))
+        };
+        let without = |k: usize| [&added[..k], &added[k + 1..]].concat();
+        let promising = (0..added.len()).filter(is_promising);
+        promising.map(without).collect()
     }
 
     /// The sets that explain the logs as well as the best one, fitted from a trial.

@@ -52,6 +52,14 @@ impl Trial {
         }
     }
 
+    /// The same without the normal equations of its fit's windows.
+    pub(super) fn without_windows(self) -> Self {
+        Self {
+            fitted: self.fitted.without_windows(),
+            ..self
+        }
+    }
+
     /// Loss over all blocks, and by the declared values.
     pub fn loss(&self) -> f64 {
         self.losses.total() + self.prior
@@ -97,7 +105,8 @@ impl Trial {
         let message = fit.columns_of(|k| problem.is_identifiable(k));
         let is_base = |i: &&usize| fit.columns[**i].parameter < first;
         let base = message.iter().filter(is_base).count();
-        Knowledge::of(problem, model, fit).distinguishes(&message, base)
+        let (base, own) = message.split_at(base);
+        Knowledge::of(problem, model, fit, base).distinguishes(own)
     }
 
     /// Whether the values of each added effect are consistent with each other and none is at a bound.
