@@ -23,6 +23,12 @@ impl Multisine {
         Self((0..TONES).map(tone).collect())
     }
 
+    /// The same motion in another size.
+    pub fn times(&self, factor: f64) -> Self {
+        let tones = self.0.iter();
+        Self(tones.map(|[a, w, p]| [factor * a, *w, *p]).collect())
+    }
+
     pub fn at(&self, time: f64) -> f64 {
         self.sum(|[a, w, p]| a * (w * time + p).sin())
     }

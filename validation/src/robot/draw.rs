@@ -72,7 +72,7 @@ impl Robot {
             effects.extend(joints.iter().map(late));
         }
         match self.hides {
-            Hides::Nothing | Hides::Drives => {}
+            Hides::Nothing | Hides::Drives | Hides::Together => {}
             Hides::Worn => wear(&mut effects, &self.build.like, &typical, rng),
             Hides::Gains => effects.extend(gains(&joints, &typical, rng)),
             Hides::Limits => {

@@ -35,6 +35,8 @@ pub enum Hides {
     Limits,
     /// As above, and sensors that read high or low.
     Zeros,
+    /// As `Drives`, and all joints move as one.
+    Together,
 }
 
 impl Hides {
@@ -46,6 +48,7 @@ impl Hides {
             Self::Gains => "gains",
             Self::Limits => "limits",
             Self::Zeros => "zeros",
+            Self::Together => "together",
         }
     }
 }
@@ -174,9 +177,17 @@ impl Robot {
             targets_hz,
             ..
         } = &self.build;
+        let one = match self.hides {
+            Hides::Together => Some(Multisine::draw(strength, *targets_hz, rng)),
+            _ => None,
+        };
         let target = |size: &f64| {
             let middle = rng.random_range(-1.0..=1.0) * size;
-            (middle, Multisine::draw(strength * size, *targets_hz, rng))
+            let waves = match &one {
+                Some(one) => one.times(*size),
+                None => Multisine::draw(strength * size, *targets_hz, rng),
+            };
+            (middle, waves)
         };
         targets.iter().map(target).collect()
     }
