@@ -1,7 +1,7 @@
 //! What tells the scale of forces on a rig whose drives' gains are sought: twice the gain moves bodies of twice the mass, with
 //! twice the friction, in the same way.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::fitted::Fitted;
 use super::problem::Problem;
@@ -23,27 +23,17 @@ pub(super) fn report_scale(problem: &Problem<'_>, fitted: &Fitted, audits: &mut 
     if !problem.is_by_law() || gains.is_empty() {
         return;
     }
-    let sources = Sources::of(problem, fitted);
-    for (source, text) in [
-        (Source::Load, "the logs with a known load tell it"),
-        (
-            Source::Bodies,
-            "only the declared bodies tell it: with others all forces would have another scale. A known load in some of \
-             the logs would tell it",
-        ),
-        (
-            Source::Drives,
-            "the logs tell it, by the drives whose gains are held",
-        ),
-    ] {
-        let is_told = |(_, parameter): &&(String, usize)| {
-            let columns = fitted.fit.columns_of(|own| own == *parameter);
-            columns
-                .first()
-                .is_some_and(|column| sources.of_column(*column) == source)
-        };
-        let told = gains.iter().filter(is_told);
-        let names: Vec<&str> = told.map(|(name, _)| name.as_str()).collect();
+    let variances = Variances::of(problem, fitted);
+    let source = |parameter: usize| {
+        let columns = fitted.fit.columns_of(|own| own == parameter);
+        Some(variances.source(*columns.first()?))
+    };
+    let told: Vec<(String, Source)> = (gains.into_iter())
+        .filter_map(|(name, parameter)| Some((name, source(parameter)?)))
+        .collect();
+    for (source, text) in SOURCES {
+        let own = told.iter().filter(|(_, of)| *of == source);
+        let names: Vec<&str> = own.map(|(name, _)| name.as_str()).collect();
         if let (false, Some(audit)) = (names.is_empty(), audits.first_mut()) {
             let text = format!("the scale of {}: {text}", names.join(", "));
             audit.add(Finding::new(Severity::Info, text));
@@ -72,36 +62,49 @@ enum Source {
     Drives,
 }
 
-/// Information on the free values of a fit, with and without what may tell the scale.
-struct Sources {
-    all: DMatrix<f64>,
+/// What is said of the gains that each tells.
+const SOURCES: [(Source, &str); 3] = [
+    (Source::Load, "the logs with a known load tell it"),
+    (
+        Source::Bodies,
+        "only the declared bodies tell it: with others all forces would have another scale. A known load in some of the \
+         logs would tell it",
+    ),
+    (
+        Source::Drives,
+        "the logs tell it, by the drives whose gains are held",
+    ),
+];
+
+/// Variances of the free values of a fit, with and without what may tell the scale.
+struct Variances {
+    all: DVector<f64>,
     /// None if no log has a known load.
-    without_load: Option<DMatrix<f64>>,
-    without_bodies: DMatrix<f64>,
+    without_load: Option<DVector<f64>>,
+    without_bodies: DVector<f64>,
 }
 
-impl Sources {
+impl Variances {
     fn of(problem: &Problem<'_>, fitted: &Fitted) -> Self {
         let is_loaded = |log: &Log| usize::from(problem.declared.has_known_load(log));
         let loaded: Vec<usize> = problem.logs.iter().map(is_loaded).collect();
         let windows = problem.shooting.windows.iter();
         let groups: Vec<usize> = windows.map(|window| loaded[window.log]).collect();
         let by_load = fitted.fit.equations_by(&groups);
+        let logs = fitted.fit.equations().hessian;
         let all = fitted.fit.information();
-        let (logs, bodies) = (fitted.fit.equations().hessian, &all);
-        let bodies = bodies - &logs;
+        let bodies = &all - &logs;
+        let without_load = (by_load.len() == 2).then(|| &by_load[0].hessian + &bodies);
         Self {
-            without_load: (by_load.len() == 2).then(|| &by_load[0].hessian + &bodies),
-            without_bodies: logs,
-            all,
+            all: variances(&all),
+            without_load: without_load.as_ref().map(variances),
+            without_bodies: variances(&logs),
         }
     }
 
     /// What tells a free value.
-    fn of_column(&self, column: usize) -> Source {
-        let is_wider = |without: &DMatrix<f64>| {
-            variance(without, column) > WIDER * WIDER * variance(&self.all, column)
-        };
+    fn source(&self, column: usize) -> Source {
+        let is_wider = |without: &DVector<f64>| without[column] > WIDER * WIDER * self.all[column];
         if self.without_load.as_ref().is_some_and(is_wider) {
             Source::Load
         } else if is_wider(&self.without_bodies) {
@@ -112,23 +115,22 @@ impl Sources {
     }
 }
 
-/// The variance of a free value, the others unknown; infinite if this information does not tell it.
-fn variance(information: &DMatrix<f64>, column: usize) -> f64 {
+/// The variance of each free value, the others unknown, huge where this information does not tell it.
+fn variances(information: &DMatrix<f64>) -> DVector<f64> {
     let (scaled, unit) = with_unit_diagonal(information);
     let Some(eigen) = eigen(scaled) else {
-        return f64::INFINITY;
+        return DVector::from_element(unit.len(), f64::INFINITY);
     };
-    let parts = eigen.eigenvalues.iter().enumerate();
-    let parts =
-        parts.map(|(k, value)| eigen.eigenvectors[(column, k)].powi(2) / value.max(NOTHING));
-    parts.sum::<f64>() * unit[column].powi(2)
+    let known = eigen.eigenvalues.map(|value| 1.0 / value.max(NOTHING));
+    let squares = eigen.eigenvectors.map(|part| part * part);
+    (squares * known).component_mul(&unit.map(|unit| unit * unit))
 }
 
 #[cfg(test)]
 mod tests {
     use nalgebra::DMatrix;
 
-    use super::{Source, Sources};
+    use super::{Source, Variances, variances};
 
     /// A gain and a mass of which the logs show the ratio alone.
     fn ratio() -> DMatrix<f64> {
@@ -143,12 +145,12 @@ mod tests {
     fn what_is_wide_without_it_tells_the_scale() {
         let bodies = knowing(0.0, 1.0);
         let told = |by_logs: DMatrix<f64>, without_load: Option<DMatrix<f64>>| {
-            let sources = Sources {
-                all: &by_logs + &bodies,
-                without_load: without_load.map(|logs| logs + &bodies),
-                without_bodies: by_logs,
+            let known = Variances {
+                all: variances(&(&by_logs + &bodies)),
+                without_load: without_load.map(|logs| variances(&(logs + &bodies))),
+                without_bodies: variances(&by_logs),
             };
-            sources.of_column(0)
+            known.source(0)
         };
         assert_eq!(told(ratio(), None), Source::Bodies);
         let loaded = ratio() + knowing(0.0, 50.0);

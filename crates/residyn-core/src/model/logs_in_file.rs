@@ -72,8 +72,8 @@ impl Model {
         Ok(self.with_values_in(log, given))
     }
 
-    /// The model with the values that a recording of this log has by the names of parameters, as far as the model file gives none
-    /// for it.
+    /// The model with the values that a recording of this log has by the names of parameters, as far as the model file neither
+    /// gives one for it nor asks a fit for it.
     ///
     /// # Errors
     /// Why a value cannot be one of its parameter.
@@ -82,8 +82,8 @@ impl Model {
         for (k, parameter) in self.parameters.iter().enumerate() {
             let mut recorded = log.values.iter();
             let recorded = recorded.find(|(name, _)| *name == parameter.name);
-            let is_given = || self.differing().value(k, false, log).is_some();
-            if let Some((_, value)) = recorded.filter(|_| !is_given()) {
+            let is_known = || parameter.per_log || self.differing().value(k, false, log).is_some();
+            if let Some((_, value)) = recorded.filter(|_| !is_known()) {
                 check_value(parameter, *value)?;
                 given.push((k, *value));
             }
