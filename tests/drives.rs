@@ -554,7 +554,7 @@ rotor_inertia    | 4 | J = 0.01
         }
         says(
             &scratch.read("out/report.md"),
-            &["the scale of actuator_gain on joint 1: the logs with a known load tell it"],
+            &["The scale of actuator_gain on joint 1: the logs with a known load tell it."],
         );
     }
 

@@ -82,6 +82,7 @@ pub use prepare::{Prepared, ReadyLogs, prepare};
 pub use problem::{Problem, Sample};
 pub use refine::{Refined, refine, with_intervals};
 pub use request::{Logs, Reference, Request};
+pub use scale_told::SCALE_OF;
 pub use score::{
     Contradicted, Errors, Finding, Needed, Predicted, Predictions, Scores, TestLog, TorqueErrors,
     score,

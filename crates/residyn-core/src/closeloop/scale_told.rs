@@ -10,6 +10,9 @@ use crate::decomposition::eigen;
 use crate::identify::with_unit_diagonal;
 use crate::model::Model;
 
+/// How a finding on what tells the scale of some gains begins.
+pub const SCALE_OF: &str = "the scale of ";
+
 /// By how much wider an interval is without what tells its value.
 const WIDER: f64 = 2.0;
 
@@ -35,7 +38,7 @@ pub(super) fn report_scale(problem: &Problem<'_>, fitted: &Fitted, audits: &mut 
         let own = told.iter().filter(|(_, of)| *of == source);
         let names: Vec<&str> = own.map(|(name, _)| name.as_str()).collect();
         if let (false, Some(audit)) = (names.is_empty(), audits.first_mut()) {
-            let text = format!("the scale of {}: {text}", names.join(", "));
+            let text = format!("{SCALE_OF}{}: {text}", names.join(", "));
             audit.add(Finding::new(Severity::Info, text));
         }
     }

@@ -7,7 +7,7 @@ use crate::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_FRICTION, WITH_NETWORK, ZEROED, capitalised, listed,
     small,
 };
-use residyn_core::closeloop::{ErrorModel, TestLog, TorqueErrors};
+use residyn_core::closeloop::{ErrorModel, SCALE_OF, TestLog, TorqueErrors};
 use residyn_core::data::{Joint, Quantity};
 use residyn_core::sim::metric::TorqueError;
 
@@ -83,10 +83,11 @@ fn compared(report: &Report) -> String {
             )
         }
         ErrorModel::InverseDynamics if is_commanded(report) => {
-            "Models are fitted and effects are selected by the torques that the logged motion needs, compared with those \
-             that the law of the drives asks for; models are compared by the motion under the logged commands. No torque \
-             was measured: the gains of the law are the scale of all forces and inertias."
-                .to_owned()
+            let by_law =
+                "Models are fitted and effects are selected by the torques that the logged motion needs, compared with \
+                 those that the law of the drives asks for; models are compared by the motion under the logged commands. \
+                 No torque was measured: the gains of the law are the scale of all forces and inertias.";
+            [&[by_law.to_owned()], scales(report).as_slice()].concat().join(" ")
         }
         ErrorModel::InverseDynamics => {
             "Models are fitted to, selected and compared by the torques that the logged motion needs: a controller \
@@ -96,6 +97,14 @@ fn compared(report: &Report) -> String {
                 .to_owned()
         }
     }
+}
+
+/// What tells the scale of the gains that were sought, in sentences.
+fn scales(report: &Report) -> Vec<String> {
+    let findings = report.audit.iter().flat_map(|audit| &audit.findings);
+    let told = findings.filter(|finding| finding.text.starts_with(SCALE_OF));
+    told.map(|finding| capitalised(&finding.text) + ".")
+        .collect()
 }
 
 /// What the last row of a table of torque errors gives.
