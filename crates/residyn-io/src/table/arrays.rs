@@ -23,14 +23,14 @@ impl Unpacked {
         }
     }
 
-    /// A vector becomes a column of its name; a matrix with one row per sample becomes the columns `name1`, `name2` ..
+    /// A vector becomes a column of its name, and a single number a value; a matrix with one row per sample becomes the columns `name1`, `name2` ..
     /// Other arrays, and arrays of texts, are left out, as are columns that nothing asks for.
     ///
     /// # Errors
     /// As [`Unpacked::add_as`].
     pub fn add(&mut self, name: &str, array: Array<impl Read>) -> Result<(), String> {
-        let is_vector = array.shape.len() == 1;
-        self.add_as(name, array, |column| match is_vector {
+        let is_one_column = array.shape.len() < 2 || array.shape.iter().all(|size| *size == 1);
+        self.add_as(name, array, |column| match is_one_column {
             true => name.to_owned(),
             false => format!("{name}{}", column + 1),
         })
