@@ -20,8 +20,14 @@ const ROUNDING: f64 = 1e-12;
 /// The torque that reaches the equations of motion, from the effect's parameters and q, v, tau of its joint.
 type Meaning = fn(&[f64], f64, f64, f64) -> f64;
 
-/// Effects of kind torque. The forces are the laws by which the benches simulate them.
-const MEANINGS: [(&str, Meaning); 4] = [
+/// Effects of kind torque, and a gear, which bears nothing at rest. Other forces are the laws by which the benches simulate
+/// them.
+const MEANINGS: [(&str, Meaning); 5] = [
+    ("gear_friction", |p, _, v, tau| match tau * v {
+        driving if driving > 0.0 => tau - p[0] * tau,
+        driven if driven < 0.0 => tau + p[1] * tau,
+        _ => tau,
+    }),
     ("actuator_gain", |p, _, _, tau| (1.0 + p[0]) * tau),
     ("actuator_deadzone", |p, _, _, tau| match tau {
         tau if tau > p[0] => tau - p[0],
