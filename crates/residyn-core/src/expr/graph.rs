@@ -1,4 +1,4 @@
-use rustc_hash::FxHashMap;
+use std::collections::HashMap;
 
 use super::Program;
 use super::op::{Binary, Node, Op, Unary};
@@ -11,7 +11,7 @@ pub struct Graph {
     pub(super) ops: Vec<Op>,
     inputs: Vec<String>,
     labels: Vec<(Node, String)>,
-    known: FxHashMap<Key, Node>,
+    known: HashMap<Key, Node>,
 }
 
 /// [`Op`] made hashable: constants by their bits.
