@@ -23,8 +23,8 @@ impl Unpacked {
         }
     }
 
-    /// A vector becomes a column of its name, and a single number a value; a matrix with one row per sample becomes the columns `name1`, `name2` ..
-    /// Other arrays, and arrays of texts, are left out, as are columns that nothing asks for.
+    /// A vector becomes a column of its name, and a single number a value; a matrix with one row per sample becomes the
+    /// columns `name1`, `name2` .. Other arrays, and arrays of texts, are left out, as are columns that nothing asks for.
     ///
     /// # Errors
     /// As [`Unpacked::add_as`].

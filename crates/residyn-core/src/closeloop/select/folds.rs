@@ -87,8 +87,8 @@ pub fn left_out_losses(folds: &Folds, fit: &Fit) -> Vec<f64> {
     blocks.iter().zip(&folds.groups).map(loss).collect()
 }
 
-/// The loss after a step along which it has this slope and curvature. Sums of squares are never negative: a loss far below zero is rounding,
-/// from a step along an undetermined value, and is unknown.
+/// The loss after a step along which it has this slope and curvature. Sums of squares are never negative: a loss far
+/// below zero is rounding, from a step along an undetermined value, and is unknown.
 pub fn predicted(cost: f64, slope: f64, curvature: f64) -> f64 {
     let loss = cost + slope + 0.5 * curvature;
     match loss < -cost {
