@@ -1,4 +1,4 @@
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::Program;
 use super::op::{Binary, Node, Op, Unary};
@@ -11,7 +11,7 @@ pub struct Graph {
     pub(super) ops: Vec<Op>,
     inputs: Vec<String>,
     labels: Vec<(Node, String)>,
-    known: HashMap<Key, Node>,
+    known: FxHashMap<Key, Node>,
 }
 
 /// [`Op`] made hashable: constants by their bits.
