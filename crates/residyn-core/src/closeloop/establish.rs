@@ -160,6 +160,10 @@ pub(super) fn standings(
             p_of_values: p_value_by(&known, problem, &chosen.fitted, k),
             p_of_falls: p_of_gains(&crossed_less, &with),
             crossed_gain: gain(&crossed_less, &with),
+            gain_by_declared: match problem.is_usual(&effect.effect) {
+                true => chosen.gain_by_declared(less, &effect),
+                false => 0.0,
+            },
         };
         let reason = evidence.lack(trials, &problem.settings.establish);
         Standing {
@@ -195,6 +199,8 @@ struct Evidence {
     /// By the falls of the loss, each half of the blocks judged with values fitted to the other half.
     p_of_falls: f64,
     crossed_gain: f64,
+    /// The part of the gain that the declared values tell, of an effect that they may tell.
+    gain_by_declared: f64,
 }
 
 impl Evidence {
@@ -226,8 +232,10 @@ impl Evidence {
                 "p = {p:.2e} is not significant among {trials} candidates"
             ));
         }
+        // Bodies that have to leave their declaration without the effect confirm it as well as unseen blocks do.
         let confirmed = self.p_of_falls <= settings.confirming_false_alarm
-            || self.crossed_gain >= settings.plain_gain;
+            || self.crossed_gain >= settings.plain_gain
+            || self.gain_by_declared >= settings.worthwhile_gain;
         (!confirmed).then(|| {
             format!(
                 "fitted to one half of the blocks, it changes the loss on the other half by {:.0} % (p = {:.2})",

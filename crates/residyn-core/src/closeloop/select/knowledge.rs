@@ -4,7 +4,15 @@ use super::equations::Eliminated;
 use crate::closeloop::problem::Problem;
 use crate::data::Quantity;
 use crate::identify::Fit;
-use crate::model::Model;
+use crate::model::{Effect, Model};
+
+impl Problem<'_> {
+    /// Whether an effect is one that most machines of the kind have and no file of theirs is about: a drive that closes a
+    /// loop of its own is a geared motor, whose file is about the links.
+    pub(in crate::closeloop) fn is_usual(&self, effect: &Effect) -> bool {
+        self.declared.driven_by() == Quantity::Command && effect.baseline.is_some()
+    }
+}
 
 /// What is known of a fit's values beside some of them, the base, and how much of it an effect needs for its own.
 pub struct Knowledge {
@@ -20,9 +28,7 @@ pub struct Knowledge {
 
 impl Knowledge {
     pub fn of(problem: &Problem<'_>, model: &Model, fit: &Fit, base: &[usize]) -> Self {
-        // A drive that closes a loop of its own is a geared motor, whose file is about the links.
-        let is_geared = problem.declared.driven_by() == Quantity::Command;
-        let usual = |k: &usize| is_geared && model.effects[*k].effect.baseline.is_some();
+        let usual = |k: &usize| problem.is_usual(&model.effects[*k].effect);
         let places: Vec<_> = (problem.added(model).filter(usual))
             .map(|k| model.place_of(k))
             .collect();

@@ -68,11 +68,22 @@ impl Trial {
     /// The loss on the joints of an effect, and by the declared values, as a share of that of the trial without the effect:
     /// by how much it falls.
     pub fn gain_over(&self, without: &Self, effect: &FittedEffect) -> f64 {
-        let loss = |of: &Self| of.losses.of_effect(effect).iter().sum::<f64>() + of.prior;
-        // What all models leave of the declared values is no loss of the effect's.
+        let [with, less] = self.beside(without, effect);
+        1.0 - with.iter().sum::<f64>() / less.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
+    /// By how much less the declared values are contradicted than without the effect, as the same share.
+    pub fn gain_by_declared(&self, without: &Self, effect: &FittedEffect) -> f64 {
+        let [[_, with], less] = self.beside(without, effect);
+        (less[1] - with) / less.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
+    /// The losses on the joints of an effect and by the declared values, of the trial and of that without the effect. What
+    /// both leave of the declared values is no loss of the effect's.
+    fn beside(&self, without: &Self, effect: &FittedEffect) -> [[f64; 2]; 2] {
         let common = self.prior.min(without.prior);
-        let [with, without] = [self, without].map(|of| loss(of) - common);
-        1.0 - with / without.max(f64::MIN_POSITIVE)
+        let on_joints = |of: &Self| of.losses.of_effect(effect).iter().sum();
+        [self, without].map(|of| [on_joints(of), of.prior - common])
     }
 
     /// Number of free values, and of simpler effects that the effects of the model contain.
