@@ -22,11 +22,14 @@ use crate::sim::metric::errors_in;
 const PARTS: usize = 2;
 /// Stretches of each part: one that is slow, say, has others beside it.
 const STRETCHES: usize = 4;
-/// Rows of a limb's logs that an estimate is made from.
-const ESTIMATED: usize = 6000;
-/// Rows of a limb's logs that only have to show which of two effects they ask for.
-const COMPARED: usize = 3000;
-/// Most steps of a fit that only has to show whether motion says more: it starts near its end.
+/// Positions in a limb's logs, of all its joints, that an estimate is made from.
+const ESTIMATED: usize = 18_000;
+/// Positions in a limb's logs that only have to show which of two effects they ask for.
+const COMPARED: usize = 9000;
+/// Joints of a limb whose motion is compared: of larger ones it takes minutes, since the lightest joint sets the steps of all.
+const MOST_JOINTS: usize = 12;
+/// Most steps of a fit that only has to show whether motion says more, or that an estimate in longer steps goes before: it
+/// starts near its end.
 const TRIAL: LevenbergMarquardt = at_most(6);
 /// Most steps of an estimate, which starts near its end as well: a limb whose motion leaves it in a long valley keeps what
 /// the torques say of the rest.
@@ -76,9 +79,10 @@ impl Problem<'_> {
     }
 }
 
-/// The limbs of a model, with the training logs.
+/// The limbs of a model whose motion is compared, with the training logs.
 pub(super) fn by_limbs(problem: &Problem<'_>, model: &Model) -> Vec<Limb> {
     let limbs = model.limbs().into_iter();
+    let limbs = limbs.filter(|joints| joints.len() <= MOST_JOINTS);
     limbs.map(|joints| Limb::of(problem, &[], joints)).collect()
 }
 
@@ -98,9 +102,10 @@ impl<'l> Comparison<'l> {
             solver: &ESTIMATE,
             ..limb.problem(whole, &NOTHING, errors)
         };
+        let rows = ESTIMATED / limb.joints().len();
         let (motion, torques) = (
-            problem(ErrorModel::OutputError).spread_over(ESTIMATED),
-            problem(ErrorModel::InverseDynamics).spread_over(ESTIMATED),
+            problem(ErrorModel::OutputError).spread_over(rows),
+            problem(ErrorModel::InverseDynamics).spread_over(rows),
         );
         let (windows, noise) = (
             torques.shooting.windows.clone(),
@@ -121,19 +126,19 @@ impl<'l> Comparison<'l> {
         }
     }
 
-    /// The motion in fine steps.
+    /// The motion in fine steps, for a fit that begins near its end.
     pub fn fine(&self, model: &Model) -> Problem<'l> {
-        stable(&self.motion, model).refined()
-    }
-
-    /// A part of the motion, for fits that end after a few steps. Bodies stay: with them free, most of the time would go into
-    /// what all models that are compared have in common.
-    pub fn short(&self, model: &Model) -> Problem<'l> {
-        let bodies = model.inertias().into_iter().flatten();
         Problem {
             solver: &TRIAL,
-            held: self.motion.held.iter().copied().chain(bodies).collect(),
-            ..stable(&self.motion.spread_over(COMPARED), model)
+            ..stable(&self.motion, model).refined()
+        }
+    }
+
+    /// A part of the motion, for fits that end after a few steps.
+    pub fn short(&self, model: &Model) -> Problem<'l> {
+        Problem {
+            solver: &TRIAL,
+            ..with_bodies_held(&self.motion.spread_over(COMPARED / model.joints), model)
         }
     }
 
@@ -144,7 +149,7 @@ impl<'l> Comparison<'l> {
         if !is_better {
             return None;
         }
-        let coarse = estimate(&stable(&self.motion, model), model).ok()?;
+        let coarse = estimate(&with_bodies_held(&self.motion, model), model).ok()?;
         let fine = self.fine(model);
         let found = estimate(&fine, &coarse.model).ok()?;
         let uncertainty = uncertainty(&fine.shooting, &found.fit);
@@ -163,6 +168,16 @@ impl<'l> Comparison<'l> {
             return 0.0;
         };
         error(trial, &model).map_or(0.0, |(by_motion, _)| log_ratio(&by_torques, &by_motion))
+    }
+}
+
+/// The same problem in stable steps, with bodies as the torques have them: free, they are most of a limb's values and of the
+/// time, and change little.
+fn with_bodies_held<'l>(problem: &Problem<'l>, model: &Model) -> Problem<'l> {
+    let bodies = model.inertias().into_iter().flatten();
+    Problem {
+        held: problem.held.iter().copied().chain(bodies).collect(),
+        ..stable(problem, model)
     }
 }
 
