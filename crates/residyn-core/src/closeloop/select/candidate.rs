@@ -3,13 +3,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::equations::solve;
+use super::equations::{Eliminated, not_at_bounds, solve_among, step_from_bounds};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::data::{Joint, Quantity, moves_as_one};
-use crate::identify::{
-    Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, step_within_bounds, submatrix,
-};
+use crate::identify::{Fit, Shooting, WindowTerms, as_it_stands, predicted_cost};
 use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect, Model};
 
 /// Every effect of the library on every joint where it can act and is not yet in the model, and every shift of a
@@ -102,9 +100,51 @@ pub fn best_start(
         return starts.pop();
     }
     match has_switch(candidate) {
-        true => best_by_switches(problem, fitted, &starts),
+        true => best_by_switches(problem, fitted, &[starts]).pop()?,
         false => best_by_cost(problem, fitted, starts),
     }
+}
+
+/// As [`best_start`], for all these candidates, which some value switches off, in their order.
+pub fn best_starts(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    candidates: &[FittedEffect],
+) -> Vec<FittedEffect> {
+    // No window of the fit is needed, and every copy would hold all of them.
+    let fitted = &fitted.clone().without_windows();
+    type Group = (Fitted, Vec<(usize, Vec<FittedEffect>)>);
+    let mut found: Vec<(usize, FittedEffect)> = Vec::new();
+    let mut groups: Vec<Group> = Vec::new();
+    for (number, candidate) in candidates.iter().enumerate() {
+        let Some(beside) = beside(problem, fitted, candidate) else {
+            continue;
+        };
+        let mut starts = starts(candidate);
+        if starts.len() < 2 {
+            found.extend(starts.pop().map(|start| (number, start)));
+            continue;
+        }
+        // One linearisation has at most as many candidates as the model has values.
+        let size = beside.fit.columns.len();
+        let joined = groups
+            .iter_mut()
+            .find(|(other, own)| own.len() < size && other.model.effects == beside.model.effects);
+        match joined {
+            Some((_, own)) => own.push((number, starts)),
+            None => groups.push((beside, vec![(number, starts)])),
+        }
+    }
+    let best = |(beside, own): Group| {
+        let (numbers, starts): (Vec<usize>, Vec<_>) = own.into_iter().unzip();
+        let best = best_by_switches(problem, &beside, &starts);
+        let best = numbers.into_iter().zip(best);
+        Vec::from_iter(best.filter_map(|(number, best)| Some((number, best?))))
+    };
+    let best: Vec<_> = groups.into_par_iter().map(best).collect();
+    found.extend(best.concat());
+    found.sort_by_key(|(number, _)| *number);
+    found.into_iter().map(|(_, start)| start).collect()
 }
 
 /// The predicted cost over all windows of a model with a candidate at its values.
@@ -169,19 +209,14 @@ fn best_by_cost(
     Some(best.1)
 }
 
-/// As above, for a candidate that is absent at every starting point: one linearisation compares all of them, since only
-/// the parameters that switch the effect on change anything there.
+/// As above, for candidates that are absent at every starting point: one linearisation compares all of them, since only
+/// the parameters that switch the effects on change anything there.
 fn best_by_switches(
     problem: &Problem<'_>,
     fitted: &Fitted,
-    starts: &[FittedEffect],
-) -> Option<FittedEffect> {
-    let numbered = starts.iter().enumerate().map(|(number, start)| {
-        let mut start = start.clone();
-        start.effect.name = format!("{} {number}", start.effect.name);
-        start
-    });
-    let numbered: Vec<FittedEffect> = numbered.collect();
+    starts: &[Vec<FittedEffect>],
+) -> Vec<Option<FittedEffect>> {
+    let numbered = numbered(starts.concat());
     let model = fitted.model.with_effects(fitted.effects_and(&numbered));
     let dynamics = problem.compiled(&model);
     let first = fitted.model.effects.len();
@@ -193,31 +228,67 @@ fn best_by_switches(
     active.retain(|k| *k < places[0].start || switches.contains(k));
     let start_states = problem.sample.start_states(&fitted.fit.start_states);
     let (shooting, scale) = (&problem.sample.shooting, fitted.fit.scale);
-    let fit = as_it_stands(shooting, &dynamics, &active, start_states, scale).ok()?;
-    let all = fit.equations_and_prior();
-    let cost = |place: &Range<usize>| {
-        let own = fit.columns_of(|k| k < places[0].start || place.contains(&k));
-        least_cost(&dynamics, &fit, &all, own)
+    let Ok(fit) = as_it_stands(shooting, &dynamics, &active, start_states, scale) else {
+        return vec![None; starts.len()];
     };
-    let costs = places.iter().map(cost).zip(starts);
-    let best = costs.filter_map(|(cost, start)| Some((cost?, start)));
-    let best = best.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(best.1.clone())
+    let least = LeastCost::of(&dynamics, &fit, fit.columns_of(|k| k < places[0].start));
+    let mut places = places.into_iter();
+    let best = |starts: &Vec<FittedEffect>| {
+        let costs: Vec<Option<f64>> = (places.by_ref().take(starts.len()))
+            .map(|place| least.with(fit.columns_of(|k| place.contains(&k))))
+            .collect();
+        let costs = costs.into_iter().zip(starts);
+        let known = costs.filter_map(|(cost, start)| Some((cost?, start)));
+        let best = known.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(best.1.clone())
+    };
+    starts.iter().map(best).collect()
 }
 
-/// The minimum of the quadratic cost over some free values; values at a bound that would leave it are held.
-fn least_cost(dynamics: &Dynamics, fit: &Fit, all: &WindowTerms, own: Vec<usize>) -> Option<f64> {
-    let step = |free: &[usize]| {
-        let matrix = submatrix(&all.hessian, free, free);
-        Some(-solve(&matrix, &all.gradient.select_rows(free))?)
-    };
-    let leaves = |i: usize, step: f64| {
-        let parameter = &dynamics.parameters[fit.columns[i].parameter];
-        let [low, high] = parameter.bounds;
-        parameter.value <= low && step < 0.0 || parameter.value >= high && step > 0.0
-    };
-    let (free, step) = step_within_bounds(own, step, leaves)?;
-    Some(0.5 * all.gradient.select_rows(&free).dot(&step))
+/// Minima of the quadratic cost over some free values, the base among them; values at a bound that would leave it are held.
+struct LeastCost<'a> {
+    dynamics: &'a Dynamics,
+    fit: &'a Fit,
+    all: WindowTerms,
+    base: Vec<usize>,
+    /// `None` if the equations do not determine the base.
+    eliminated: Option<Eliminated>,
+}
+
+impl<'a> LeastCost<'a> {
+    fn of(dynamics: &'a Dynamics, fit: &'a Fit, base: Vec<usize>) -> Self {
+        let all = fit.equations_and_prior();
+        let base = not_at_bounds(dynamics, fit, &all, base);
+        Self {
+            eliminated: Eliminated::ridged(&all.hessian, &base),
+            dynamics,
+            fit,
+            all,
+            base,
+        }
+    }
+
+    /// The change of the cost with more free values.
+    fn with(&self, more: Vec<usize>) -> Option<f64> {
+        let step = |free: &[usize]| match free.strip_prefix(self.base.as_slice()) {
+            Some(more) => {
+                let step = self.eliminated.as_ref()?.solve(more, &self.all.gradient)?;
+                Some(-step.select_rows(free))
+            }
+            None => Some(-solve_among(&self.all, free)?),
+        };
+        let all = [self.base.as_slice(), &more].concat();
+        let (free, step) = step_from_bounds(self.dynamics, self.fit, all, step)?;
+        Some(0.5 * self.all.gradient.select_rows(&free).dot(&step))
+    }
+}
+
+/// The same effects with names of their own, so that one model can have all of them.
+pub(super) fn numbered(mut effects: Vec<FittedEffect>) -> Vec<FittedEffect> {
+    for (number, effect) in effects.iter_mut().enumerate() {
+        effect.effect.name = format!("{} {number}", effect.effect.name);
+    }
+    effects
 }
 
 /// The parameters of a model, counted among all, that switch one of its effects off at zero.

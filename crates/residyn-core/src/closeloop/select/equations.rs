@@ -2,7 +2,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::identify::{submatrix, with_unit_diagonal};
+use crate::identify::{Fit, WindowTerms, step_within_bounds, submatrix, with_unit_diagonal};
+use crate::model::Dynamics;
 
 /// Smallest information on a direction, in units in which each value alone has 1: redundant items share it.
 const RIDGE: f64 = 1e-9;
@@ -12,6 +13,41 @@ pub fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>
     let (scaled, unit) = ridged(matrix);
     let solution = scaled.cholesky()?.solve(&right.component_mul(&unit));
     Some(solution.component_mul(&unit))
+}
+
+/// A step of some free values of a fit to the minimum of its quadratic cost, and those of them that stay free: values at a
+/// bound that would leave it are held. `step` gives the step of some values, `None` if it cannot be solved for.
+pub fn step_from_bounds(
+    dynamics: &Dynamics,
+    fit: &Fit,
+    values: Vec<usize>,
+    step: impl Fn(&[usize]) -> Option<DVector<f64>>,
+) -> Option<(Vec<usize>, DVector<f64>)> {
+    let leaves = |i: usize, step: f64| {
+        let parameter = &dynamics.parameters[fit.columns[i].parameter];
+        let [low, high] = parameter.bounds;
+        parameter.value <= low && step < 0.0 || parameter.value >= high && step > 0.0
+    };
+    step_within_bounds(values, step, leaves)
+}
+
+/// The values among these that no bound stops. Beside others they are free from the start: to find out for each choice
+/// of others again that a value stays at its bound takes most of the time.
+pub fn not_at_bounds(
+    dynamics: &Dynamics,
+    fit: &Fit,
+    all: &WindowTerms,
+    values: Vec<usize>,
+) -> Vec<usize> {
+    let step = |free: &[usize]| Some(-solve_among(all, free)?);
+    let found = step_from_bounds(dynamics, fit, values.clone(), step);
+    found.map_or(values, |(free, _)| free)
+}
+
+/// The solution of a part of normal equations.
+pub fn solve_among(all: &WindowTerms, free: &[usize]) -> Option<DVector<f64>> {
+    let matrix = submatrix(&all.hessian, free, free);
+    solve(&matrix, &all.gradient.select_rows(free))
 }
 
 /// Normal equations in which some values, the base, are always free, and others now and then. The base is eliminated once: each

@@ -1,5 +1,8 @@
-use super::candidate::{acting, best_start, screened_cost};
+use super::candidate::{acting, best_start, has_switch, numbered, screened_cost, starts};
 use super::identity::EffectId;
+use super::screening::Screening;
+use super::sets::lowest;
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::model::{Effect, FittedEffect};
@@ -11,39 +14,91 @@ pub(super) struct Exchange {
     pub pair: [EffectId; 2],
 }
 
+/// One of a model's effects, by its place, and another that may replace it.
+struct Swap {
+    place: usize,
+    new: FittedEffect,
+}
+
 /// Sets in which one of a model's effects is replaced by another that it is easily confused with, on the same joint.
 /// Added to the model, such an effect predicts little gain, since each does most of what the other does. An effect with
 /// a whole number, which was found with other effects in the set, is also exchanged for itself with another number: the
-/// one with the largest predicted gain, and those next to the present one.
-pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Exchange> {
+/// one with the largest predicted gain, and those next to the present one. Exchanges that are predicted to leave a loss
+/// beyond the limit on left-out blocks are left out.
+pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted, limit: f64) -> Vec<Exchange> {
     let declared = problem.declared.effects.len();
+    let fitted = fitted.clone().without_windows();
     let mut sets = Vec::new();
-    for k in problem.added(&fitted.model) {
+    for Swap { place, new } in promising(problem, &fitted, swaps(problem, &fitted), limit) {
         let mut rest = fitted.clone();
-        let old = rest.model.effects.remove(k);
+        let old = rest.model.effects.remove(place);
+        let mut starts = Vec::from_iter(in_place_of(problem, &rest, &old, &new));
+        if new.effect.name == old.effect.name {
+            starts.extend(with_numbers_beside(problem, &rest, &old));
+        }
+        sets.extend(starts.into_iter().map(|start| {
+            let pair = [problem.id(&old), problem.id(&start)];
+            let set = [&rest.model.effects[declared..], &[start]].concat();
+            Exchange { set, pair }
+        }));
+    }
+    sets
+}
+
+/// The effects of a model with all that may replace them.
+fn swaps(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Swap> {
+    let mut swaps = Vec::new();
+    for place in problem.added(&fitted.model) {
+        let mut rest = fitted.model.effects.clone();
+        let old = rest.remove(place);
         let is_like = |new: &&Effect| {
             let is_counted = new.parameters.iter().any(|parameter| parameter.whole);
             old.effect.is_confused_with(new) || is_counted && new.name == old.effect.name
         };
         let like: Vec<Effect> = problem.effects().iter().filter(is_like).cloned().collect();
-        for new in acting(problem, &like) {
-            let present = &rest.model.effects;
-            let is_free = !present.iter().any(|p| p.excludes(&new) || p.contains(&new));
-            if new.joint != old.joint || !is_free {
-                continue;
-            }
-            let mut starts = Vec::from_iter(in_place_of(problem, &rest, &old, &new));
-            if new.effect.name == old.effect.name {
-                starts.extend(with_numbers_beside(problem, &rest, &old));
-            }
-            sets.extend(starts.into_iter().map(|start| {
-                let pair = [problem.id(&old), problem.id(&start)];
-                let set = [&present[declared..], &[start]].concat();
-                Exchange { set, pair }
-            }));
-        }
+        let mut new = acting(problem, &like);
+        let is_free = |new: &FittedEffect| !rest.iter().any(|p| p.excludes(new) || p.contains(new));
+        new.retain(|new| new.joint == old.joint && is_free(new));
+        swaps.extend(new.into_iter().map(|new| Swap { place, new }));
     }
-    sets
+    swaps
+}
+
+/// The swaps that may leave a loss within the limit. One linearisation predicts it for all of them if torques are
+/// compared, which nearly all effects enter linearly; motion shows only in a fit.
+fn promising(problem: &Problem<'_>, fitted: &Fitted, swaps: Vec<Swap>, limit: f64) -> Vec<Swap> {
+    if problem.error_model == ErrorModel::OutputError {
+        return swaps;
+    }
+    let starts = |swap: &Swap| match has_switch(&swap.new) {
+        true => starts(&swap.new),
+        false => Vec::new(),
+    };
+    let starts: Vec<Vec<FittedEffect>> = swaps.iter().map(starts).collect();
+    let Some(screening) = Screening::with(problem, fitted, &numbered(starts.concat())) else {
+        return swaps;
+    };
+    let first = problem.added(&fitted.model).start;
+    let present = screening.present();
+    let mut next = present.len();
+    let is_promising = |(swap, starts): (&Swap, Vec<FittedEffect>)| {
+        let items = next..next + starts.len();
+        next = items.end;
+        let rest = present
+            .iter()
+            .copied()
+            .filter(|item| first + item != swap.place);
+        let rest: Vec<usize> = rest.collect();
+        let set = |item| [rest.as_slice(), &[item]].concat();
+        let best = lowest(&screening, items.map(set).collect(), 1);
+        starts.is_empty() || best.first().is_some_and(|(loss, _)| *loss <= limit)
+    };
+    let promise: Vec<bool> = swaps.iter().zip(starts).map(is_promising).collect();
+    let promising = swaps
+        .into_iter()
+        .zip(promise)
+        .filter(|(_, promise)| *promise);
+    promising.map(|(swap, _)| swap).collect()
 }
 
 /// The effect that replaces another: at its best start or, if the prediction is better there, at the value of the old

@@ -62,14 +62,10 @@ impl Folds {
         self
     }
 
-    /// Normal equations of each block and of each group.
-    pub fn equations(&self, fit: &Fit) -> (Vec<WindowTerms>, Vec<WindowTerms>) {
-        let blocks = fit.equations_by(&self.blocks);
-        let mut groups = vec![fit.zero_equations(); count(&self.groups)];
-        for (part, &group) in blocks.iter().zip(&self.groups) {
-            groups[group] += part;
-        }
-        (blocks, groups)
+    /// Normal equations of each group.
+    pub fn equations(&self, fit: &Fit) -> Vec<WindowTerms> {
+        let group = |block: &usize| self.groups[*block];
+        fit.equations_by(&self.blocks.iter().map(group).collect::<Vec<usize>>())
     }
 }
 
@@ -99,7 +95,7 @@ pub fn predicted(cost: f64, slope: f64, curvature: f64) -> f64 {
 
 /// For each group, the step of a fit's values when the group is left out.
 pub fn steps_without(folds: &Folds, fit: &Fit) -> Vec<DVector<f64>> {
-    let (_, groups) = folds.equations(fit);
+    let groups = folds.equations(fit);
     let all = fit.equations_and_prior();
     let step = |part: &WindowTerms| {
         // At a bound the gradients do not sum to zero; the bound's part must not move the rest.

@@ -3,7 +3,7 @@ use rayon::prelude::*;
 use super::candidate::candidates;
 use super::evidence::gain;
 use super::screening::{Screening, Set};
-use super::sets::ranked;
+use super::sets::lowest;
 use super::trial::{Trial, differences};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
@@ -67,11 +67,10 @@ fn instead_of(
     others.remove(k);
     let sets = (screening.present().len()..screening.items.len())
         .map(|item| [others.as_slice(), &[item]].concat());
-    let mut options = ranked(screening, sets.collect());
+    let mut options = lowest(screening, sets.collect(), settings.rivals_per_effect);
     options.retain(|(loss, _)| {
         *loss <= settings.prediction_slack * settings.rival_loss * chosen.loss()
     });
-    options.truncate(settings.rivals_per_effect);
     let own = |trial: &Trial| trial.losses.of_effect(present);
     let gain = |trial: &Trial| gain(&own(less), &own(trial));
     let rival = |(_, set): (f64, Set)| {

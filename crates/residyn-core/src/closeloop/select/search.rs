@@ -321,7 +321,7 @@ impl<'a> Search<'a> {
     fn exchanged(&mut self, from: &Trial) -> Vec<Trial> {
         self.say("exchanging effects");
         let problem = self.problem;
-        let mut exchanges = exchanges(problem, &from.fitted);
+        let mut exchanges = exchanges(problem, &from.fitted, self.promising_below(from));
         exchanges.retain(|exchange| !self.rejected.contains(&exchange.pair));
         if exchanges.is_empty() {
             return Vec::new();
@@ -361,7 +361,7 @@ impl<'a> Search<'a> {
             let effects = &current.fitted.model.effects;
             let simpler = simpler(problem, effects, added.clone()).into_iter();
             let mut sets: Vec<_> = simpler.map(|set| set[declared..].to_vec()).collect();
-            let exchanges = exchanges(problem, &current.fitted);
+            let exchanges = exchanges(problem, &current.fitted, self.promising_below(best));
             sets.extend(exchanges.into_iter().map(|exchange| exchange.set));
             sets.extend(at_other_scales(problem.declared, &effects[declared..]));
             sets.extend(self.without_one(&current, best));
@@ -415,9 +415,14 @@ impl<'a> Search<'a> {
 
     /// Whether a set may explain the logs as well as the best one, as its predicted loss has it.
     fn is_promising(&self, screening: &Screening, set: &[usize], best: &Trial) -> bool {
-        let settings = &self.problem.settings.select;
         let loss = screening.loss(set).unwrap_or(f64::INFINITY);
-        loss <= best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
+        loss <= self.promising_below(best)
+    }
+
+    /// The largest predicted loss of a set that may explain the logs as well as the best one.
+    fn promising_below(&self, best: &Trial) -> f64 {
+        let settings = &self.problem.settings.select;
+        best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
     }
 
     /// The sets without one of a trial's effects that may explain the logs as well as the best one.

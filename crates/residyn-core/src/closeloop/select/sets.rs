@@ -2,8 +2,11 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use super::screening::{Screening, Set};
+use super::screening::{Minimum, Screening, Set};
 use crate::closeloop::problem::Problem;
+
+/// As many left-out losses are worked out at once, whatever the number of cores.
+const AT_ONCE: usize = 16;
 
 /// Sets of a screening's items that are predicted to lower the loss on left-out blocks, found by a beam search: from
 /// the items of the model, one item is added or dropped at a time, and the best few sets of each step start the next.
@@ -23,8 +26,7 @@ pub fn best_predicted(screening: &Screening, problem: &Problem<'_>) -> Vec<Set> 
         let next = beam.iter().flat_map(|set| neighbours(screening, set, most));
         let mut next: Vec<Set> = next.collect();
         next.retain(|set| seen.insert(set.clone()));
-        let mut scored = ranked(screening, next);
-        scored.truncate(settings.beam_width);
+        let scored = lowest(screening, next, settings.beam_width);
         beam = scored.iter().map(|(_, set)| set.clone()).collect();
         let lowest = scored.first().map_or(f64::INFINITY, |(loss, _)| *loss);
         found.extend(scored);
@@ -65,18 +67,32 @@ pub fn descent(screening: &Screening, from: Set) -> Vec<Set> {
     let less = |set: &Set| {
         let without = |k: usize| [&set[..k], &set[k + 1..]].concat();
         let less = (0..set.len()).map(without).collect();
-        Some(ranked(screening, less).into_iter().next()?.1)
+        Some(lowest(screening, less, 1).pop()?.1)
     };
     std::iter::successors(less(&from), less).collect()
 }
 
-/// Sets with their predicted losses, the lowest first; those whose values the logs do not distinguish are left out.
-pub fn ranked(screening: &Screening, sets: Vec<Set>) -> Vec<(f64, Set)> {
-    let scored = sets.into_par_iter();
-    let scored = scored.filter_map(|set| Some((screening.loss(&set)?, set)));
-    let mut scored: Vec<(f64, Set)> = scored.collect();
-    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-    scored
+/// The sets with the lowest predicted losses on left-out blocks, the lowest first; those whose values the logs do not
+/// distinguish are left out. The loss of a fit to all blocks is a lower bound, and in order of it few sets need more.
+pub fn lowest(screening: &Screening, sets: Vec<Set>, count: usize) -> Vec<(f64, Set)> {
+    let bounded = sets.into_par_iter();
+    let bounded = bounded.filter_map(|set| Some((screening.minimum(&set)?, set)));
+    let mut bounded: Vec<(Minimum, Set)> = bounded.collect();
+    bounded.sort_by(|(a, _), (b, _)| a.loss.total_cmp(&b.loss));
+    let mut lowest: Vec<(f64, Set)> = Vec::new();
+    for few in bounded.chunks(AT_ONCE) {
+        let is_lower = |(highest, _): &(f64, Set)| few[0].0.loss <= *highest;
+        if lowest.len() >= count && !lowest.last().is_some_and(is_lower) {
+            break;
+        }
+        let few = few.par_iter();
+        let losses =
+            few.filter_map(|(minimum, set)| Some((screening.left_out_loss(minimum)?, set.clone())));
+        lowest.par_extend(losses);
+        lowest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        lowest.truncate(count);
+    }
+    lowest
 }
 
 /// The best set of each size, then the best of the rest.

@@ -229,7 +229,7 @@ effect = [
     let wrong = problem.with_effects(&fitted, set).unwrap();
     let delay = wrong.model.effects[0].values[0].0;
     assert!(delay > 0.01);
-    let all = exchanges(&problem, &wrong);
+    let all = exchanges(&problem, &wrong, f64::INFINITY);
     for number in [5.0, 7.0] {
         let mut ripple = wrong.model.effects[1].clone();
         ripple.values[1].0 = number;
