@@ -202,9 +202,25 @@ pub(super) fn estimate(problem: &Problem<'_>, model: &Model) -> Result<Fitted, F
 
 /// The loss of the motion under the commands, after a short fit of a model to it.
 pub(super) fn loss_of_motion(problem: &Problem<'_>, model: &Model) -> Option<f64> {
+    fitted_to_motion(problem, model, |_, fitted| fitted.loss())
+}
+
+/// Sums of the squared position errors under the commands, one per joint, after a short fit of a model to the motion.
+pub(super) fn squares_of_motion(problem: &Problem<'_>, model: &Model) -> Option<Vec<f64>> {
+    fitted_to_motion(problem, model, |trial, fitted| {
+        squares(trial, &fitted.model, &trial.shooting.windows)
+    })
+}
+
+fn fitted_to_motion<T>(
+    problem: &Problem<'_>,
+    model: &Model,
+    of: impl Fn(&Problem<'_>, &Fitted) -> T,
+) -> Option<T> {
     let limb = Limb::of(problem, &[], Joint::all(problem.declared.joints).collect());
     let trial = Comparison::of(problem, &limb).short(model);
-    estimate(&trial, model).ok().map(|fitted| fitted.loss())
+    let fitted = estimate(&trial, model).ok()?;
+    Some(of(&trial, &fitted))
 }
 
 /// Sums of the squared position errors in these windows, one per joint.
@@ -216,7 +232,7 @@ fn squares(problem: &Problem<'_>, model: &Model, windows: &[Window]) -> Vec<f64>
 }
 
 /// The logarithm of the ratios of two such sums, on average: joints count alike, however far they move.
-fn log_ratio(own: &[f64], other: &[f64]) -> f64 {
+pub(super) fn log_ratio(own: &[f64], other: &[f64]) -> f64 {
     let of_joint = |(own, other): (&f64, &f64)| (own / other).ln();
     own.iter().zip(other).map(of_joint).sum::<f64>() / own.len() as f64
 }

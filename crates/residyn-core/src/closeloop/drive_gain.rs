@@ -6,7 +6,7 @@ use crate::expr::is_of_torque;
 use crate::model::{Model, Parameter};
 
 /// Two values may share a factor by chance.
-const FEWEST: usize = 3;
+pub(super) const FEWEST: usize = 3;
 
 /// A smaller difference from 1 is within what a drawing is off.
 const LEAST: f64 = 0.1;

@@ -2,19 +2,19 @@
 //!
 //! Of a torque that the law asks for beyond a limit, the logs say no more than that it is beyond: a limit that is low enough,
 //! with bodies that are light enough, fits the torques of any log. No such machine would move like the rig. So limits that a
-//! search finds stay only if the model moves better with them than without, and than one with what most machines have; if
-//! not, a second search looks for none.
+//! search finds stay only if the joints that have them move better than with what a search finds that looks for none.
 
 use rand::Rng;
 
-use super::by_motion::loss_of_motion;
+use super::by_motion::{log_ratio, squares_of_motion};
 use super::error::StudyError;
 use super::fit::Declared;
+use super::scaled_bodies;
 use super::searched::Searched;
 use super::stage::Watch;
-use crate::data::Log;
+use crate::data::{Joint, Log};
 
-/// As [`Searched::by`], with limits only if the motion asks for them.
+/// As [`scaled_bodies::searched`], with limits only if the motion asks for them.
 ///
 /// # Errors
 /// As [`Problem::fit_declared`].
@@ -24,35 +24,38 @@ pub(super) fn searched<'a>(
     rng: &mut impl Rng,
     watch: &dyn Watch,
 ) -> Result<Searched<'a>, StudyError> {
-    let limited = Searched::by(declared.clone(), apart, rng, watch)?;
-    let is_sure = !limited.declared.problem.is_by_law() || !limited.has_limits();
-    if is_sure || limited.moves_by_its_limits() {
+    let limited = scaled_bodies::searched(declared.clone(), apart, rng, watch)?;
+    let joints = limited.limited_joints();
+    if joints.is_empty() || !limited.declared.problem.is_by_law() {
         return Ok(limited);
     }
     let mut without = declared;
     without.problem.library = without.problem.library.without_limits();
-    Searched::by(without, apart, rng, watch)
+    let without = scaled_bodies::searched(without, apart, rng, watch)?;
+    Ok(match limited.moves_better_than(&without, &joints) {
+        true => limited,
+        false => without,
+    })
 }
 
 impl Searched<'_> {
-    fn has_limits(&self) -> bool {
-        let mut added = self.added().iter();
-        added.any(|added| added.effect.limits_command())
+    fn limited_joints(&self) -> Vec<Joint> {
+        let added = self.added().iter();
+        let limits = added.filter(|added| added.effect.limits_command());
+        limits.map(|limit| limit.joint).collect()
     }
 
-    /// Whether the motion is fitted better with the limits than without them, and than with what most machines have.
-    fn moves_by_its_limits(&self) -> bool {
-        let (problem, model) = (&self.declared.problem, &self.chosen.after.model);
-        let mut without = self.added().to_vec();
-        without.retain(|added| !added.effect.limits_command());
-        let without = [&problem.declared.effects, without.as_slice()].concat();
-        let without = model.with_effects(without);
-        let usual = self.chosen.usual.as_ref().map(|usual| &usual.model);
-        let Some(loss) = loss_of_motion(problem, model) else {
+    /// Whether these joints move more like the logged ones than those that another search found.
+    fn moves_better_than(&self, other: &Self, joints: &[Joint]) -> bool {
+        let problem = &self.declared.problem;
+        let squares = |searched: &Self| {
+            let squares = squares_of_motion(problem, &searched.chosen.after.model)?;
+            Some(Vec::from_iter(joints.iter().map(|joint| squares[*joint])))
+        };
+        let enough = (1.0 - problem.settings.select.round_gain).ln();
+        let Some(own) = squares(self) else {
             return false;
         };
-        let enough = loss / (1.0 - problem.settings.select.round_gain);
-        let mut others = usual.into_iter().chain([&without]);
-        others.all(|other| loss_of_motion(problem, other).is_none_or(|other| other > enough))
+        squares(other).is_none_or(|other| log_ratio(&own, &other) < enough)
     }
 }

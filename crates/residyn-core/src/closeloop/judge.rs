@@ -15,9 +15,10 @@ use super::one_way::moves_one_way;
 use super::payload::p_of_departure;
 use super::problem::Problem;
 use super::refine::Refined;
+use super::scaled_bodies::scaled_bodies;
 use super::select::p_value;
 use crate::data::Log;
-use crate::model::{Entry, FittedEffect, Model, Status};
+use crate::model::{Effect, Entry, FittedEffect, Model, Status};
 
 /// What the declared model lacks, judged by the logs.
 pub struct Found<'a> {
@@ -198,8 +199,10 @@ impl Chosen {
             Some(p) if p > least => Some(format!(
                 "in finer steps its value is not significant (p = {p:.2})"
             )),
-            _ => holds_zero(&refined.after.model.effects[k])
-                .then(|| "the interval of its size holds zero".to_owned()),
+            _ if holds_zero(&refined.after.model.effects[k]) => {
+                Some("the interval of its size holds zero".into())
+            }
+            _ => scaled_bodies(problem, &refined.after.model, k),
         };
         let reasons: Vec<Option<String>> = added.map(reason).collect();
         for (standing, reason) in self.standings.iter_mut().zip(reasons) {
@@ -226,10 +229,16 @@ fn depends_on_angle(effect: &FittedEffect) -> bool {
     names.contains(&"q") && !names.contains(&"qd")
 }
 
-/// Whether an effect may be absent: zero lies within the interval of each value that is zero without it.
+/// Whether an effect may be absent: zero lies within the interval of each value that is zero without it. Where a load sits
+/// says nothing of that.
 fn holds_zero(effect: &FittedEffect) -> bool {
-    let values = effect.effect.parameters.iter().zip(&effect.values);
-    let switches = values.filter(|(parameter, _)| parameter.is_switch());
+    let Effect {
+        parameters, entry, ..
+    } = &effect.effect;
+    let values = parameters.iter().zip(&effect.values);
+    let switches = values.filter(|(parameter, _)| {
+        parameter.is_switch() && !entry.needed().contains(&parameter.name.as_str())
+    });
     let mut intervals = switches.map(|(_, (_, interval))| *interval).peekable();
     intervals.peek().is_some()
         && intervals.all(|interval| interval.is_some_and(|[low, high]| low <= 0.0 && high >= 0.0))

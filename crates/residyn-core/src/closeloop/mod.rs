@@ -41,6 +41,7 @@ mod problem;
 mod refine;
 mod request;
 mod scale_told;
+mod scaled_bodies;
 mod score;
 mod searched;
 mod select;

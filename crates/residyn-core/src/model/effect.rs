@@ -133,7 +133,7 @@ impl Entry {
     }
 
     /// Parameters that the effect has by name: the share of the next joint, the position of a load.
-    pub(super) fn needed(&self) -> &'static [&'static str] {
+    pub(crate) fn needed(&self) -> &'static [&'static str] {
         match self {
             Self::Coupling(_) => &[RATIO],
             Self::Payload(_) => &PLACE,
@@ -405,6 +405,11 @@ impl Effect {
         let is_in_proportion = pairs
             .all(|(acting, command)| (acting - gain * command).abs() <= PROPORTIONAL * gain.abs());
         is_in_proportion.then_some(gain)
+    }
+
+    /// Whether the acting torque is in proportion to the command, at typical values.
+    pub(crate) fn is_gain(&self) -> bool {
+        self.gain(&self.typical()).is_some()
     }
 
     fn typical(&self) -> Vec<f64> {

@@ -12,11 +12,11 @@ use super::system::Model;
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../models");
 
 /// Read once: every command and every library call asks for it.
-static EMBEDDED: LazyLock<Library> = LazyLock::new(|| Library {
-    effects: embedded("effects", Effect::from_text).into(),
-    probes: embedded("probes", Effect::from_text).into(),
-    of_one_filter: Arc::default(),
-    without_limits: Arc::default(),
+static EMBEDDED: LazyLock<Library> = LazyLock::new(|| {
+    Library::of(
+        embedded("effects", Effect::from_text).into(),
+        embedded("probes", Effect::from_text).into(),
+    )
 });
 
 /// The effects and systems known by name: the embedded ones and a user's own. A clone shares them.
@@ -47,6 +47,7 @@ pub struct Library {
     /// Made on first use.
     of_one_filter: Arc<OnceLock<Vec<Library>>>,
     without_limits: Arc<OnceLock<Box<Library>>>,
+    without_gains: Arc<OnceLock<Box<Library>>>,
 }
 
 impl Library {
@@ -69,6 +70,7 @@ impl Library {
             probes,
             of_one_filter: Arc::default(),
             without_limits: Arc::default(),
+            without_gains: Arc::default(),
         }
     }
 
@@ -111,6 +113,12 @@ impl Library {
     pub(crate) fn without_limits(&self) -> &Self {
         self.without_limits
             .get_or_init(|| self.with_those(|effect| !effect.limits_command()).into())
+    }
+
+    /// The library without gains of drives.
+    pub(crate) fn without_gains(&self) -> &Self {
+        self.without_gains
+            .get_or_init(|| self.with_those(|effect| !effect.is_gain()).into())
     }
 
     /// The library with some of its effects.
@@ -245,6 +253,14 @@ mod tests {
         assert_eq!(without.effects().len(), whole.effects().len() - 2);
         assert!(without.effect("actuator_saturation").is_err());
         assert!(without.effect("actuator_gain").is_ok());
+    }
+
+    #[test]
+    fn a_library_without_gains_has_all_other_effects() {
+        let whole = Library::built_in();
+        let without = whole.without_gains();
+        assert_eq!(without.effects().len(), whole.effects().len() - 1);
+        assert!(without.effect("actuator_gain").is_err());
     }
 
     #[test]
