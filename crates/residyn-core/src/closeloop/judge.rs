@@ -231,7 +231,7 @@ fn depends_on_angle(effect: &FittedEffect) -> bool {
 
 /// Whether an effect may be absent: zero lies within the interval of each value that is zero without it. Where a load sits
 /// says nothing of that.
-fn holds_zero(effect: &FittedEffect) -> bool {
+pub(super) fn holds_zero(effect: &FittedEffect) -> bool {
     let Effect {
         parameters, entry, ..
     } = &effect.effect;

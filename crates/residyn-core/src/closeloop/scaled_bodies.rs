@@ -11,6 +11,7 @@ use rand::Rng;
 use super::drive_gain::FEWEST;
 use super::error::StudyError;
 use super::fit::Declared;
+use super::judge::holds_zero;
 use super::problem::Problem;
 use super::refine::with_intervals;
 use super::score::{Contradicted, contradicted};
@@ -43,18 +44,22 @@ pub(super) fn searched<'a>(
 }
 
 impl Searched<'_> {
-    /// Whether gains were found, and none is told from the bodies.
+    /// Whether gains were found, and none is told from the bodies: its interval holds zero, or its body follows it.
     fn has_gains_of_bodies(&self) -> bool {
         let (problem, after) = (&self.declared.problem, &self.chosen.after);
         let is_gain = |k: &usize| after.model.effects[*k].effect.is_gain();
-        let mut gains = problem.added(&after.model).filter(is_gain).peekable();
-        if gains.peek().is_none() || !problem.is_by_law() {
+        let gains: Vec<usize> = problem.added(&after.model).filter(is_gain).collect();
+        if gains.is_empty() || !problem.is_by_law() {
             return false;
         }
         let known = uncertainty(&problem.shooting, &after.fit);
         let model = with_intervals(problem, after, &known, &after.model);
-        let scaled: Vec<usize> = gains.map(|k| scaled_by(problem, &model, k).len()).collect();
-        !scaled.contains(&0) && scaled.iter().sum::<usize>() >= FEWEST
+        let there = gains
+            .into_iter()
+            .filter(|k| !holds_zero(&model.effects[*k]));
+        let scaled: Vec<usize> = there.map(|k| scaled_by(problem, &model, k).len()).collect();
+        let are_scaled = !scaled.contains(&0) && scaled.iter().sum::<usize>() >= FEWEST;
+        scaled.is_empty() || are_scaled
     }
 }
 
