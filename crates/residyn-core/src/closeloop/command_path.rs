@@ -40,31 +40,24 @@ fn searched_on<'a>(
     rng: &mut impl Rng,
     watch: &dyn Watch,
 ) -> Option<Searched<'a>> {
-    let Declared { problem, fitted } = best.declared.clone();
+    let problem = &best.declared.problem;
     let found = &best.chosen.after.model;
-    let enough = loss_of_motion(&problem, found)? * (1.0 - problem.settings.select.round_gain);
+    let enough = loss_of_motion(problem, found)? * (1.0 - problem.settings.select.round_gain);
     let of_filter = |library: &'a Library| {
         let filter = library.effects().iter().find(|effect| effect.is_filter())?;
-        let model = filtered_by(filter, &problem, found)?;
-        Some((loss_of_motion(&problem, &model)?, library, model))
+        let model = filtered_by(filter, problem, found)?;
+        Some((loss_of_motion(problem, &model)?, library, model))
     };
     let filters = problem.library.of_one_filter().iter();
     let likeliest = filters
         .filter_map(of_filter)
         .min_by(|a, b| a.0.total_cmp(&b.0));
     let (_, library, model) = likeliest.filter(|(loss, ..)| *loss < enough)?;
-    let alone = Problem {
-        library,
-        ..problem.clone()
-    };
-    let first = estimate(&alone, &model).ok()?;
-    let alone = Declared {
-        problem: alone,
-        fitted,
-    };
+    let alone = best.declared.clone().with_library(library);
+    let first = estimate(&alone.problem, &model).ok()?;
     let mut other = Searched::from(first, alone, apart, rng, watch);
     other.declared.problem.library = problem.library;
-    let loss = loss_of_motion(&problem, &other.chosen.after.model)?;
+    let loss = loss_of_motion(problem, &other.chosen.after.model)?;
     (loss < enough).then_some(other)
 }
 

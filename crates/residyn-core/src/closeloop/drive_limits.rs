@@ -29,9 +29,8 @@ pub(super) fn searched<'a>(
     if joints.is_empty() || !limited.declared.problem.is_by_law() {
         return Ok(limited);
     }
-    let mut without = declared;
-    without.problem.library = without.problem.library.without_limits();
-    let without = scaled_bodies::searched(without, apart, rng, watch)?;
+    let unlimited = declared.problem.library.without_limits();
+    let without = scaled_bodies::searched(declared.with_library(unlimited), apart, rng, watch)?;
     Ok(match limited.moves_better_than(&without, &joints) {
         true => limited,
         false => without,

@@ -27,6 +27,15 @@ pub struct Declared<'a> {
     pub fitted: Fitted,
 }
 
+impl<'a> Declared<'a> {
+    /// The same, with what is to be found taken from another library.
+    #[must_use]
+    pub(super) fn with_library(mut self, library: &'a Library) -> Self {
+        self.problem.library = library;
+        self
+    }
+}
+
 /// The declared model, fitted to its motion, and what the logs determine of it.
 type ByMotion = (Fitted, Identifiability);
 

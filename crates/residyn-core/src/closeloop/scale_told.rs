@@ -50,8 +50,7 @@ fn gains(model: &Model) -> Vec<(String, usize)> {
     let of_law = of_law.map(|k| (model.parameters[k].name.clone(), k));
     let effects = model.effects.iter().enumerate();
     let of_effects = effects.filter_map(|(k, own)| {
-        let values: Vec<f64> = own.values.iter().map(|(value, _)| *value).collect();
-        let is_gain = !own.fixed && own.effect.gain(&values).is_some();
+        let is_gain = !own.fixed && own.gain().is_some();
         let name = || format!("{} on joint {}", own.effect.name, own.joint);
         is_gain.then(|| (name(), model.place_of(k).start))
     });

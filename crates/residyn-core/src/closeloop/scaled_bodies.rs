@@ -38,9 +38,8 @@ pub(super) fn searched<'a>(
     if !found.has_gains_of_bodies() {
         return Ok(found);
     }
-    let mut without = declared;
-    without.problem.library = without.problem.library.without_gains();
-    Searched::by(without, apart, rng, watch)
+    let without_gains = declared.problem.library.without_gains();
+    Searched::by(declared.with_library(without_gains), apart, rng, watch)
 }
 
 impl Searched<'_> {
@@ -76,12 +75,13 @@ pub(super) fn scaled_bodies(problem: &Problem<'_>, fitted: &Model, k: usize) -> 
 /// model; none of another effect. A known load tells the two apart.
 fn scaled_by(problem: &Problem<'_>, fitted: &Model, k: usize) -> Vec<String> {
     let own = &fitted.effects[k];
-    let values: Vec<f64> = own.values.iter().map(|(value, _)| *value).collect();
     let mut logs = problem.logs.iter();
     let is_told = !problem.is_by_law() || logs.any(|log| problem.declared.has_known_load(log));
-    let gain = own.effect.gain(&values).filter(|_| !is_told);
+    let Some(gain) = own.gain().filter(|_| !is_told) else {
+        return Vec::new();
+    };
     let bodies = problem.declared.inertias();
-    let (Some(gain), Some(body)) = (gain, bodies.get(own.joint.index())) else {
+    let Some(body) = bodies.get(own.joint.index()) else {
         return Vec::new();
     };
     let declared = &problem.declared.parameters;

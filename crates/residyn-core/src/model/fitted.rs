@@ -55,6 +55,12 @@ impl FittedEffect {
         }
     }
 
+    /// By what it multiplies every command, if it is a gain.
+    pub(crate) fn gain(&self) -> Option<f64> {
+        let values: Vec<f64> = self.values.iter().map(|(value, _)| *value).collect();
+        self.effect.gain(&values)
+    }
+
     /// Identifies the effect within a model.
     pub fn label(&self) -> String {
         format!(
