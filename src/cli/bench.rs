@@ -178,10 +178,6 @@ fn configuration(cell: &Cell) -> Result<String> {
     if cell.model.is_file() {
         bytes.extend(fs::read(&cell.model)?);
     }
-    if let Source::Robot(robot) = &cell.source {
-        bytes
-            .extend(fs::read(&robot.machine).with_context(|| robot.machine.display().to_string())?);
-    }
     if let Source::Files { logs, .. } = &cell.source {
         for log in logs {
             bytes.extend(fs::read(log).with_context(|| log.display().to_string())?);

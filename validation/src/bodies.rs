@@ -58,19 +58,9 @@ impl Bodies {
         })
     }
 
-    /// The first bodies alone, which no other carries.
-    pub fn first(mut self, count: usize) -> Self {
-        self.links.truncate(count);
-        self
-    }
-
     /// Whether another body carries the one with this index.
     pub fn is_carried(&self, index: usize) -> bool {
         self.links[index].parent.is_some()
-    }
-
-    pub fn count(&self) -> usize {
-        self.links.len()
     }
 
     /// The same robot with each body's mass and size off by shares within this range, up or down.

@@ -110,8 +110,6 @@ struct Robots {
     name: String,
     /// A model file, relative to the grid.
     model: PathBuf,
-    /// The model file whose first bodies the robots have, if the first does not show its own.
-    machine: Option<PathBuf>,
     hides: Vec<Hides>,
     /// First and last number of the cells of each kind.
     numbers: [u64; 2],
@@ -429,7 +427,6 @@ impl Robots {
 
     fn cells(&self, path: &Path) -> Vec<Cell> {
         let [first, last] = self.numbers;
-        let machine = self.machine.as_ref().unwrap_or(&self.model);
         let cell = |hides: Hides, number: u64, place: usize| Cell {
             id: format!("{}/{}/{number}", self.name, hides.name()),
             group: match hides {
@@ -444,7 +441,6 @@ impl Robots {
             start: BTreeMap::new(),
             source: Source::Robot(Box::new(Robot {
                 hides,
-                machine: beside_or_named(path, machine),
                 build: self.build.clone(),
                 flaws: self.flaws[place % self.flaws.len()].clone(),
             })),

@@ -3,8 +3,6 @@
 mod draw;
 mod servo;
 
-use std::path::PathBuf;
-
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
@@ -17,8 +15,7 @@ use super::recording::{STRENGTHS, log_name};
 use super::sensors::{Clock, Flaws, Losses, Speed, repeat, sensed};
 use residyn_core::data::{Joint, Log, Quantity};
 use residyn_core::limits::{RUNS, check_readings};
-use residyn_core::model::{Library, Model};
-use residyn_io::read_model;
+use residyn_core::model::Model;
 
 /// What a robot hides in addition to bodies that differ from their model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -107,8 +104,6 @@ impl Build {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Robot {
     pub hides: Hides,
-    /// The model file whose first bodies it has: the equations of a short chain do not show theirs.
-    pub machine: PathBuf,
     pub build: Build,
     pub flaws: Flaws,
 }
@@ -117,7 +112,7 @@ impl Robot {
     /// The effects that this robot hides, in sizes that fit its motion.
     ///
     /// # Errors
-    /// A model file that cannot be read, has no bodies or no gains, or has another number of joints.
+    /// A model that has no bodies or no gains, or has another number of joints.
     pub(crate) fn hidden(&self, model: &Model, rng: &mut impl Rng) -> anyhow::Result<Vec<Hidden>> {
         let rig = self.as_declared(model)?;
         Ok(self.draw(&rig, rng))
@@ -146,11 +141,8 @@ impl Robot {
     /// With the bodies and the gains that its model declares, and nothing else.
     fn as_declared(&self, model: &Model) -> anyhow::Result<Rig> {
         let joints = self.build.targets.len();
-        let machine = read_model(&self.machine, &Library::built_in())?;
-        let bodies = Bodies::of(&machine).map(|bodies| bodies.first(joints));
-        let bodies = bodies.filter(|bodies| bodies.count() == joints && joints == model.joints);
-        let name = self.machine.display();
-        let needs = || anyhow::anyhow!("{name}: needs the bodies of {joints} joints");
+        let bodies = Bodies::of(model).filter(|_| joints == model.joints);
+        let needs = || anyhow::anyhow!("{}: needs the bodies of {joints} joints", model.name);
         let gain = |stem: &str, joint: Joint| {
             let name = joint.name(stem);
             let gain = model.parameters.iter().find(|own| own.name == name);

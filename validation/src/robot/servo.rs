@@ -181,9 +181,9 @@ mod tests {
 
     fn leg(servo: &Servo) -> Rig {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/bench");
-        let model = read_model(folder.join("robot-quadruped.toml"), &Library::built_in()).unwrap();
+        let model = read_model(folder.join("robot-leg.toml"), &Library::built_in()).unwrap();
         Rig {
-            bodies: Bodies::of(&model).unwrap().first(3),
+            bodies: Bodies::of(&model).unwrap(),
             servos: vec![servo.clone(); 3],
         }
     }

@@ -28,8 +28,12 @@ const ABOUT: &str = "equations derived from the description of a mechanism";
 
 /// The text of a tree's model file: up to three joints as equations in closed form with base parameters, more
 /// as bodies; damping, dry friction, rotors, springs and effort limits as effects.
+///
+/// Where position loops drive the joints, a few are written as bodies as well: their sums alone do not tell a rotor from
+/// the link that turns with it, and that a body has to be physical does.
 pub fn model_text(tree: &Tree) -> String {
-    let (equations, rotors) = if is_short(tree) {
+    let is_in_closed_form = is_short(tree) && !has_servos(tree);
+    let (equations, rotors) = if is_in_closed_form {
         let closed = ClosedForm::of(tree);
         (closed.text(), closed.rotors())
     } else {
@@ -40,16 +44,21 @@ pub fn model_text(tree: &Tree) -> String {
     declared + &effects(tree, &rotors)
 }
 
-/// Whether its equations are written in closed form.
+/// Whether it has equations in closed form.
 pub(super) fn is_short(tree: &Tree) -> bool {
     let follows = |joint: &Joint| joint.follows.is_some();
     tree.joints.len() <= LONGEST_CLOSED_FORM && !tree.joints.iter().any(follows)
 }
 
+/// Whether a position loop drives some joint.
+fn has_servos(tree: &Tree) -> bool {
+    let has_servo = |joint: &Joint| joint.drivetrain.servo.is_some();
+    tree.joints.iter().any(has_servo)
+}
+
 /// The text with the joints' drives, if some joint is not driven by a torque.
 fn with_drives(text: String, tree: &Tree) -> String {
-    let servo = |joint: &Joint| joint.drivetrain.servo.is_some();
-    if tree.drive.is_none() && !tree.joints.iter().any(servo) {
+    if tree.drive.is_none() && !has_servos(tree) {
         return text;
     }
     let mut model: DocumentMut = text.parse().expect("what is written here is TOML");

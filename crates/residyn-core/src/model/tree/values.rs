@@ -25,7 +25,7 @@ pub enum ValuesError {
 }
 
 /// For each joint, the inertia to add, in its frame, so that the parameters of the tree's model file have these
-/// values. For a small tree, whose parameters are sums, the bodies nearest to the tree's are taken.
+/// values. For a model in closed form, whose parameters are sums, the bodies nearest to the tree's are taken.
 ///
 /// # Errors
 /// A parameter without a value, or sums that no bodies have.
@@ -35,12 +35,14 @@ pub fn added(
 ) -> Result<Vec<Inertia>, ValuesError> {
     let value = |name: &str| value(name).ok_or_else(|| ValuesError::Missing(name.to_owned()));
     let now = parts_of(tree);
-    let new = match is_short(tree) {
+    let of_bodies = Bodies(tree).parameters();
+    let has_bodies = of_bodies.iter().all(|(name, ..)| value(name).is_ok());
+    let new = match is_short(tree) && !has_bodies {
         true => nearest(&now, &sums(tree, &now, value)?).ok_or(ValuesError::NoBodies)?,
         false => {
             let mut new = now.clone();
-            for (name, kind, joint) in Bodies(tree).parameters() {
-                new[joint][kind.place()] = value(&name)?;
+            for (name, kind, joint) in &of_bodies {
+                new[*joint][kind.place()] = value(name)?;
             }
             new
         }
