@@ -26,11 +26,14 @@ pub(super) fn searched<'a>(
     rng: &mut impl Rng,
     watch: &dyn Watch,
 ) -> Result<Searched<'a>, StudyError> {
-    let best = drive_limits::searched(declared, apart, rng, watch)?;
-    if !best.declared.problem.is_by_law() || !is_in_doubt(&best) {
-        return Ok(best);
+    let whole = declared.problem.library;
+    let mut best = drive_limits::searched(declared, apart, rng, watch)?;
+    if best.declared.problem.is_by_law() && is_in_doubt(&best) {
+        best = searched_on(&best, apart, rng, watch).unwrap_or(best);
     }
-    Ok(searched_on(&best, apart, rng, watch).unwrap_or(best))
+    // What a search left out, like joints may have.
+    best.declared.problem.library = whole;
+    Ok(best)
 }
 
 /// What the search finds from there with the one filter that the motion asks for; `None` if the motion is fitted no better.
@@ -55,8 +58,7 @@ fn searched_on<'a>(
     let (_, library, model) = likeliest.filter(|(loss, ..)| *loss < enough)?;
     let alone = best.declared.clone().with_library(library);
     let first = estimate(&alone.problem, &model).ok()?;
-    let mut other = Searched::from(first, alone, apart, rng, watch);
-    other.declared.problem.library = problem.library;
+    let other = Searched::from(first, alone, apart, rng, watch);
     let loss = loss_of_motion(problem, &other.chosen.after.model)?;
     (loss < enough).then_some(other)
 }

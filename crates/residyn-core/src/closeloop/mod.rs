@@ -23,6 +23,7 @@ mod external_force;
 mod fit;
 mod fitted;
 mod free_swing;
+mod friction_by_motion;
 mod gravity;
 mod imposed;
 mod judge;

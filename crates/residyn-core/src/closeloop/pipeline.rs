@@ -46,6 +46,7 @@ pub fn solve(
     let declared = fit(prepared, watch)?;
     let mut found = find(declared, &prepared.test.for_fits, rng, watch)?;
     found.decide_by_motion();
+    found.add_friction_by_motion();
     let alternatives = discriminate(&found, watch);
     let mut refined = refine(&found, watch);
     refined.estimate_by_motion();

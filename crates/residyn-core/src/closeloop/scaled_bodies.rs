@@ -43,7 +43,8 @@ pub(super) fn searched<'a>(
 }
 
 impl Searched<'_> {
-    /// Whether gains were found, and none is told from the bodies: its interval holds zero, or its body follows it.
+    /// Whether gains were found, and none is told from the bodies: its interval holds zero, or its body follows it, or that
+    /// of a gain of about the same factor. The body of a joint on the base may show little of its own.
     fn has_gains_of_bodies(&self) -> bool {
         let (problem, after) = (&self.declared.problem, &self.chosen.after);
         let is_gain = |k: &usize| after.model.effects[*k].effect.is_gain();
@@ -56,9 +57,18 @@ impl Searched<'_> {
         let there = gains
             .into_iter()
             .filter(|k| !holds_zero(&model.effects[*k]));
-        let scaled: Vec<usize> = there.map(|k| scaled_by(problem, &model, k).len()).collect();
-        let are_scaled = !scaled.contains(&0) && scaled.iter().sum::<usize>() >= FEWEST;
-        scaled.is_empty() || are_scaled
+        let factors: Vec<(f64, usize)> = there
+            .filter_map(|k| {
+                let scaled = scaled_by(problem, &model, k).len();
+                Some((model.effects[k].gain()?, scaled))
+            })
+            .collect();
+        let is_scaled = |(own, _): &(f64, usize)| {
+            let mut with_bodies = factors.iter().filter(|(_, scaled)| *scaled > 0);
+            with_bodies.any(|(other, _)| is_same_factor(*own, *other))
+        };
+        let scaled: usize = factors.iter().map(|(_, scaled)| scaled).sum();
+        factors.is_empty() || factors.iter().all(is_scaled) && scaled >= FEWEST
     }
 }
 
@@ -98,8 +108,11 @@ fn scaled_by(problem: &Problem<'_>, fitted: &Model, k: usize) -> Vec<String> {
 
 /// Whether a value is off its declaration by about this factor.
 fn is_scaled_by(gain: f64, off: &Contradicted) -> bool {
-    let factor = off.fitted.value / off.declared;
-    SAME_FACTOR.contains(&(factor.ln() / gain.ln()))
+    is_same_factor(gain, off.fitted.value / off.declared)
+}
+
+fn is_same_factor(gain: f64, other: f64) -> bool {
+    SAME_FACTOR.contains(&(other.ln() / gain.ln()))
 }
 
 #[cfg(test)]
