@@ -6,12 +6,13 @@
 
 use rayon::prelude::*;
 
+use super::establish::Standing;
 use super::plainer::Unused;
 use super::searched::Searched;
 use super::select::{Trial, p_value};
 use super::stage::Watch;
 use crate::data::{Joint, Quantity};
-use crate::model::{AlikeOn, FittedEffect, Model, Status};
+use crate::model::{AlikeOn, EffectParameter, FittedEffect, Model, Status};
 
 /// A part of a rig that was searched on its own, and its joints.
 pub(super) struct Part<'a> {
@@ -214,21 +215,32 @@ impl<'a> Part<'a> {
         let effects = [model.effects.as_slice(), std::slice::from_ref(effect)].concat();
         let fitted = problem.with_better_effects(&trial.fitted, effects, trial.loss())?;
         let found = Trial::of(problem, fitted);
-        let p = p_value(problem, &found.fitted, model.effects.len());
-        let is_shown = p.is_some_and(|p| p < problem.settings.establish.uncorrected_false_alarm);
+        let settings = &problem.settings.establish;
+        let is_shown = match p_value(problem, &found.fitted, model.effects.len()) {
+            Some(p) => p < settings.uncorrected_false_alarm,
+            None => found.gain_over(trial, effect) >= settings.worthwhile_gain,
+        };
         (is_shown && found.is_valid(problem)).then_some(found)
     }
 
-    /// Establish usual effects that are significant on their own: they are not one of many candidates.
+    /// Establish usual effects that are significant on their own: they are not one of many candidates. Of one that no value
+    /// switches off, such as a limit, the loss says it.
     fn confirm(&mut self, usual: &[Usual]) {
         let own = self.own(usual);
         let chosen = &mut self.searched.chosen;
-        let level = (self.searched.declared.problem.settings.establish).uncorrected_false_alarm;
+        let settings = &self.searched.declared.problem.settings.establish;
+        let is_shown = |standing: &Standing| {
+            let mut parameters = standing.effect.effect.parameters.iter();
+            match parameters.any(EffectParameter::is_switch) {
+                true => standing.gain > 0.0 && standing.p_value < settings.uncorrected_false_alarm,
+                false => standing.gain >= settings.worthwhile_gain,
+            }
+        };
         for standing in &mut chosen.standings {
             let is_usual = own
                 .iter()
                 .any(|(_, effect)| effect.is_same(&standing.effect));
-            if is_usual && standing.p_value < level && standing.gain > 0.0 {
+            if is_usual && is_shown(standing) {
                 standing.status = Status::Established;
                 standing.reason = None;
             }
