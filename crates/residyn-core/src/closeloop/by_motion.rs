@@ -142,11 +142,12 @@ impl<'l> Comparison<'l> {
         }
     }
 
-    /// The model by motion, with intervals, if each part of the logs says that motion predicts it better.
+    /// The model by motion, with intervals, if the parts of the logs together say that motion predicts them better.
     fn better(&self, model: &Model) -> Option<Model> {
         let trial = stable(&self.trial, model);
-        let is_better = (0..PARTS).all(|part| self.gain(&trial, model, part) > 0.0);
-        if !is_better {
+        let gains = (0..PARTS).into_par_iter();
+        let gains: Vec<f64> = gains.map(|part| self.gain(&trial, model, part)).collect();
+        if gains.iter().sum::<f64>() <= 0.0 {
             return None;
         }
         let coarse = estimate(&with_bodies_held(&self.motion, model), model).ok()?;
