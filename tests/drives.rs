@@ -565,6 +565,49 @@ rotor_inertia    | 4 | J = 0.01
         );
     }
 
+    /// A weak hip with lighter bodies, or a strong thigh and calf: the leg moves alike. As drawn, it is the latter.
+    #[test]
+    fn gains_of_a_leg_are_those_with_which_its_bodies_are_as_drawn() {
+        const HIDDEN: &str = "
+actuator_gain    | 2 | g = 0.35
+actuator_gain    | 3 | g = 0.35
+coulomb_friction | 1 | F_c = 0.25
+coulomb_friction | 2 | F_c = 0.2
+coulomb_friction | 3 | F_c = 0.25
+actuator_delay   | 1 | d = 0.008
+actuator_delay   | 2 | d = 0.008
+actuator_delay   | 3 | d = 0.008
+";
+        let scratch = Scratch::new();
+        let drawn = include_str!("../configs/bench/robot-leg.toml");
+        scratch.file("drawn.toml", drawn);
+        scratch.file("built.toml", [drawn, &effects(HIDDEN)].join("\n"));
+        scratch.file(
+            "plant.toml",
+            "model = \"built.toml\"
+sensor = { rate_hz = 200, position_noise = 1e-4, position_step = 0 }
+excitation = { amplitude = [0.4, 0.6, 0.7], band_hz = [0.1, 3.0], tones = 8 }
+recording = { logs = 1, duration_s = 10, start = [0, 0, 0, 0, 0, 0] }",
+        );
+        for k in 1..=3 {
+            let log = format!("simulate --plant plant.toml --out run{k}.csv --seed {k}");
+            scratch.succeeds(&log);
+        }
+        let report =
+            scratch.json("closeloop --model drawn.toml --train run1.csv run2.csv --test run3.csv");
+        let hidden: Vec<[String; 3]> = rows(HIDDEN);
+        assert_eq!(report["effects"].as_array().unwrap().len(), hidden.len());
+        for [name, joint, value] in hidden {
+            let (_, truth) = value.split_once(" = ").unwrap();
+            let [value, ..] = found(&report, &name, joint.parse().unwrap()).unwrap();
+            let truth: f64 = truth.parse().unwrap();
+            assert!(
+                (value / truth - 1.0).abs() < 0.01,
+                "{name} {joint}: {value}"
+            );
+        }
+    }
+
     const MOVED: &str = "
 sensor = { rate_hz = 200, position_noise = 2e-4, position_step = 0 }
 excitation = { amplitude = [0.6, 0.6, 0.6, 0.6], band_hz = [0.1, 3.0], tones = 8 }

@@ -146,6 +146,7 @@ fn effect(outcome: &Outcome, finding: &Finding) -> EffectEntry {
         p_value: finding.p_value,
         error_reduction: finding.error_reduction.as_ref().ok().copied(),
         error_reduction_failure: (finding.error_reduction.as_ref().err()).map(ToString::to_string),
+        motion_reduction: finding.motion_reduction,
         not_established: finding.reason.clone(),
     }
 }

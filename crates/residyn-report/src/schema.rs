@@ -159,13 +159,18 @@ pub(super) struct EffectEntry {
     pub parameters: Vec<ParameterEntry>,
     #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
-    /// share of the position error that this effect alone removes; negative if it adds error; null if the refit without
+    /// share of the compared error that this effect alone removes; negative if it adds error; null if the refit without
     /// the effect failed
     #[schemars(range(max = 1))]
     pub error_reduction: Option<f64>,
     /// why that refit failed
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_reduction_failure: Option<String>,
+    /// share of the loss of the motion under the commands that this effect removes on the training logs, if the torques
+    /// of the drives' law do not show it and the motion does
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = 1))]
+    pub motion_reduction: Option<f64>,
     /// for an effect that is only supported: what evidence is missing
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_established: Option<String>,

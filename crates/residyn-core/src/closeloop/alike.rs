@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::establish::Standing;
 use super::plainer::Unused;
+use super::problem::Problem;
 use super::searched::Searched;
 use super::select::{Trial, p_value};
 use super::stage::Watch;
@@ -215,35 +216,41 @@ impl<'a> Part<'a> {
         let effects = [model.effects.as_slice(), std::slice::from_ref(effect)].concat();
         let fitted = problem.with_better_effects(&trial.fitted, effects, trial.loss())?;
         let found = Trial::of(problem, fitted);
-        let settings = &problem.settings.establish;
-        let is_shown = match p_value(problem, &found.fitted, model.effects.len()) {
-            Some(p) => p < settings.uncorrected_false_alarm,
-            None => found.gain_over(trial, effect) >= settings.worthwhile_gain,
-        };
-        (is_shown && found.is_valid(problem)).then_some(found)
+        let p_value = p_value(problem, &found.fitted, model.effects.len());
+        let gain = found.gain_over(trial, effect);
+        (problem.is_shown(gain, p_value) && found.is_valid(problem)).then_some(found)
     }
 
-    /// Establish usual effects that are significant on their own: they are not one of many candidates. Of one that no value
-    /// switches off, such as a limit, the loss says it.
+    /// Establish usual effects that the logs show on their own: they are not one of many candidates.
     fn confirm(&mut self, usual: &[Usual]) {
         let own = self.own(usual);
         let chosen = &mut self.searched.chosen;
-        let settings = &self.searched.declared.problem.settings.establish;
-        let is_shown = |standing: &Standing| {
+        let problem = &self.searched.declared.problem;
+        let shows = |standing: &Standing| {
             let mut parameters = standing.effect.effect.parameters.iter();
-            match parameters.any(EffectParameter::is_switch) {
-                true => standing.gain > 0.0 && standing.p_value < settings.uncorrected_false_alarm,
-                false => standing.gain >= settings.worthwhile_gain,
-            }
+            let is_switched = parameters.any(EffectParameter::is_switch);
+            problem.is_shown(standing.gain, is_switched.then_some(standing.p_value))
         };
         for standing in &mut chosen.standings {
             let is_usual = own
                 .iter()
                 .any(|(_, effect)| effect.is_same(&standing.effect));
-            if is_usual && is_shown(standing) {
+            if is_usual && shows(standing) {
                 standing.status = Status::Established;
                 standing.reason = None;
             }
+        }
+    }
+}
+
+impl Problem<'_> {
+    /// Whether the logs show a usual effect by its significance or, if no value switches it off, as with a limit, by what
+    /// it gains.
+    fn is_shown(&self, gain: f64, p_value: Option<f64>) -> bool {
+        let settings = &self.settings.establish;
+        match p_value {
+            Some(p) => gain > 0.0 && p < settings.uncorrected_false_alarm,
+            None => gain >= settings.worthwhile_gain,
         }
     }
 }

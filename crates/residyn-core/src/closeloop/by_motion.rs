@@ -48,12 +48,11 @@ const fn at_most(most_steps: usize) -> LevenbergMarquardt {
 impl Refined<'_> {
     /// The declared and the chosen model by motion, limb by limb, wherever a fit to motion predicts stretches of the logs
     /// that it has not seen better than a fit to torques does. Rigs whose torques are measured stay as they are.
-    pub(super) fn estimate_by_motion(&mut self) {
+    pub(super) fn estimate_by_motion(&mut self, limbs: &[Limb]) {
         let problem = &self.problem;
-        if !problem.is_by_law() || self.failure.is_some() {
+        if self.failure.is_some() {
             return;
         }
-        let limbs = by_limbs(problem, &self.after.model);
         for fitted in [&mut self.before, &mut self.after] {
             self.by_motion.clear();
             let found = limbs.par_iter().map(|limb| {
@@ -77,13 +76,14 @@ impl Problem<'_> {
         self.error_model == ErrorModel::InverseDynamics
             && self.declared.driven_by() == Quantity::Command
     }
-}
 
-/// The limbs of a model whose motion is compared, with the training logs.
-pub(super) fn by_limbs(problem: &Problem<'_>, model: &Model) -> Vec<Limb> {
-    let limbs = model.limbs().into_iter();
-    let limbs = limbs.filter(|joints| joints.len() <= MOST_JOINTS);
-    limbs.map(|joints| Limb::of(problem, &[], joints)).collect()
+    /// The limbs whose motion is compared, with the training logs: none where torques are measured.
+    pub(super) fn limbs_by_motion(&self) -> Vec<Limb> {
+        let limbs = self.is_by_law().then(|| self.declared.limbs());
+        let limbs = limbs.into_iter().flatten();
+        let limbs = limbs.filter(|joints| joints.len() <= MOST_JOINTS);
+        limbs.map(|joints| Limb::of(self, &[], joints)).collect()
+    }
 }
 
 /// A limb's logs, compared by motion and by the torques that the law of its drives asks for.

@@ -9,7 +9,7 @@ use crate::model::{Model, Parameter};
 pub(super) const FEWEST: usize = 3;
 
 /// A smaller difference from 1 is within what a drawing is off.
-const LEAST: f64 = 0.1;
+pub(super) const LEAST: f64 = 0.1;
 
 /// Report in the first log's audit that all values which a torque's size enters, declared and fitted, differ by one factor.
 pub(super) fn report_drive_gain(declared: &Model, fitted: &Model, audits: &mut [Audit]) {

@@ -21,6 +21,8 @@ pub struct Standing {
     pub status: Status,
     /// Relative fall of the loss on left-out blocks due to this effect, given the others.
     pub gain: f64,
+    /// Relative fall of the loss of the motion under the commands, for an effect that the motion asked for.
+    pub gain_by_motion: Option<f64>,
     /// Probability of such evidence without the effect.
     pub p_value: f64,
     /// Why it is not established, in a sentence.
@@ -40,6 +42,7 @@ impl Standing {
             effect,
             status: Status::Established,
             gain,
+            gain_by_motion: None,
             p_value,
             reason: None,
             without,
@@ -173,6 +176,7 @@ pub(super) fn standings(
                 Some(_) => Status::Supported,
             },
             gain: evidence.gain,
+            gain_by_motion: None,
             p_value: evidence.p(&problem.settings.establish),
             reason,
             without: Ok(less.fitted.clone()),

@@ -5,31 +5,34 @@
 
 use rayon::prelude::*;
 
-use super::by_motion::{Comparison, by_limbs, estimate};
+use super::by_motion::{Comparison, estimate};
 use super::establish::Standing;
 use super::fitted::Fitted;
 use super::judge::{Found, mark};
 use super::limbs::Limb;
 use super::problem::Problem;
 use super::select::{baseline_friction, p_value};
-use crate::data::Joint;
 use crate::model::{FittedEffect, Model};
 
 /// A friction of the whole's, and how it shows in the motion: by how much the loss falls, and the probability of its value.
 type Asked = (FittedEffect, (f64, f64));
 
-/// No evidence.
-const NONE: (f64, f64) = (0.0, 1.0);
+/// The evidence of a friction, and the fit without it; none of either if its value is not significant.
+struct Shown {
+    evidence: (f64, f64),
+    without: Option<Fitted>,
+}
+
+const NOTHING: Shown = Shown {
+    evidence: (0.0, 1.0),
+    without: None,
+};
 
 impl Found<'_> {
     /// Add the friction that most machines have to joints on which it is not established, wherever the motion is fitted
     /// better by a share that is of use.
-    pub(super) fn add_friction_by_motion(&mut self) {
-        if !self.problem.is_by_law() {
-            return;
-        }
+    pub(super) fn add_friction_by_motion(&mut self, limbs: &[Limb]) {
         let doubtful = self.doubtful_friction();
-        let limbs = by_limbs(&self.problem, &self.chosen.after.model);
         let asked = limbs.par_iter().flat_map_iter(|limb| {
             let is_own = |friction: &&FittedEffect| limb.joints().contains(&friction.joint);
             let own = doubtful.iter().filter(is_own).cloned().collect();
@@ -56,21 +59,22 @@ impl Found<'_> {
             return Vec::new();
         }
         let mut sure = self.chosen.after.model.limb(limb.joints());
-        let place = |joint: Joint| limb.joints().iter().position(|own| *own == joint);
-        let local = |friction: &FittedEffect| {
-            friction.on(Joint::at(place(friction.joint).expect("it is on the limb")))
-        };
-        let local: Vec<FittedEffect> = doubtful.iter().map(local).collect();
+        let local: Vec<FittedEffect> =
+            (doubtful.iter().map(|friction| limb.of_limb(friction))).collect();
         (sure.effects).retain(|known| !local.iter().any(|friction| friction.excludes(known)));
         let trial = Comparison::of(&self.problem, limb).short(&sure);
-        let asked = Friction { trial, sure }.asked(local);
-        let of_whole =
-            |(friction, shown): Asked| (friction.on(limb.joints()[friction.joint]), shown);
-        asked.into_iter().map(of_whole).collect()
+        let asked = Friction { trial, sure }.asked(local).unwrap_or_default();
+        let asked = asked.into_iter();
+        asked
+            .map(|(friction, evidence)| (limb.of_whole(&friction), evidence))
+            .collect()
     }
 
     /// Establish friction in the chosen set, if it can be fitted with it.
     fn add(&mut self, asked: &[Asked]) {
+        if asked.is_empty() {
+            return;
+        }
         let (problem, chosen) = (&self.problem, &mut self.chosen);
         let before = chosen.after.model.effects.clone();
         let is_new = |(friction, _): &&Asked| !before.iter().any(|own| own.excludes(friction));
@@ -89,7 +93,10 @@ impl Found<'_> {
             let Some(effect) = chosen.after.model.effects.iter().find(is_it) else {
                 continue;
             };
-            let sure = Standing::sure(effect.clone(), *shown, Ok(without.clone()));
+            let sure = Standing {
+                gain_by_motion: Some(shown.0),
+                ..Standing::sure(effect.clone(), *shown, Ok(without.clone()))
+            };
             match chosen
                 .standings
                 .iter_mut()
@@ -115,33 +122,42 @@ struct Friction<'l> {
 }
 
 impl Friction<'_> {
-    /// Of the friction in doubt, what the motion asks for: all without which the loss would rise.
-    fn asked(&self, mut doubtful: Vec<FittedEffect>) -> Vec<Asked> {
+    /// Of the friction in doubt, what the motion asks for: all without which the loss would rise. `None` if it cannot be
+    /// fitted, or if all of it together says little.
+    fn asked(&self, mut doubtful: Vec<FittedEffect>) -> Option<Vec<Asked>> {
         let worthwhile = self.trial.settings.establish.worthwhile_gain;
         let (all, none) = rayon::join(|| self.with(&doubtful), || self.with(&[]));
-        let (Some(all), Some(none)) = (all, none) else {
-            return Vec::new();
-        };
-        if fall(&all, &none) < worthwhile {
-            return Vec::new();
+        let (mut with, none) = (all?, none?);
+        if fall(&with, &none) < worthwhile {
+            return None;
         }
-        let mut place = 0..;
-        doubtful.retain(|_| {
-            self.p_value(&all, place.next().expect("there are numbers for all"))
-                .is_some()
-        });
+        let significant = self.significant(&with, &doubtful);
+        if significant.len() < doubtful.len() {
+            (with, doubtful) = (self.with(&significant)?, significant);
+        }
         loop {
-            let Some(with) = self.with(&doubtful) else {
-                return Vec::new();
+            let of_each = (0..doubtful.len()).into_par_iter();
+            let of_each = of_each.map(|k| self.shown(&with, &none, &doubtful, k));
+            let mut shown: Vec<Shown> = of_each.collect();
+            let gain = |k: &usize| shown[*k].evidence.0;
+            let least = (0..shown.len()).min_by(|a, b| gain(a).total_cmp(&gain(b)));
+            let Some(least) = least.filter(|least| gain(least) < worthwhile) else {
+                let evidence = shown.into_iter().map(|shown| shown.evidence);
+                return Some(doubtful.into_iter().zip(evidence).collect());
             };
-            let shown = |k: usize| self.shown(&with, &doubtful, k);
-            let shown: Vec<(f64, f64)> = (0..doubtful.len()).into_par_iter().map(shown).collect();
-            let least = (0..shown.len()).min_by(|a, b| shown[*a].0.total_cmp(&shown[*b].0));
-            match least.filter(|least| shown[*least].0 < worthwhile) {
-                Some(least) => doubtful.remove(least),
-                None => return doubtful.into_iter().zip(shown).collect(),
+            doubtful.remove(least);
+            with = match shown.swap_remove(least).without {
+                Some(without) => without,
+                None => self.with(&doubtful)?,
             };
         }
+    }
+
+    /// Those of the frictions that a model is fitted with whose values are significant.
+    fn significant(&self, with: &Fitted, friction: &[FittedEffect]) -> Vec<FittedEffect> {
+        let places = friction.iter().enumerate();
+        let significant = places.filter(|(k, _)| self.p_value(with, *k).is_some());
+        significant.map(|(_, friction)| friction.clone()).collect()
     }
 
     /// The model with such friction, after a short fit to the motion.
@@ -151,14 +167,20 @@ impl Friction<'_> {
     }
 
     /// How the k-th friction shows in the motion.
-    fn shown(&self, with: &Fitted, friction: &[FittedEffect], k: usize) -> (f64, f64) {
-        let mut others = friction.to_vec();
-        others.remove(k);
+    fn shown(&self, with: &Fitted, none: &Fitted, friction: &[FittedEffect], k: usize) -> Shown {
         let Some(p) = self.p_value(with, k) else {
-            return NONE;
+            return NOTHING;
         };
-        self.with(&others)
-            .map_or(NONE, |without| (fall(with, &without), p))
+        let others = [&friction[..k], &friction[k + 1..]].concat();
+        let without = match others.is_empty() {
+            true => Some(none.clone()),
+            false => self.with(&others),
+        };
+        let of = |without: Fitted| Shown {
+            evidence: (fall(with, &without), p),
+            without: Some(without),
+        };
+        without.map_or(NOTHING, of)
     }
 
     /// The probability of the value of the k-th friction, if it is significant.

@@ -134,8 +134,16 @@ impl Limb {
         }
     }
 
-    fn of_whole(&self, effect: &FittedEffect) -> FittedEffect {
+    /// An effect of the limb as one of the whole.
+    pub(super) fn of_whole(&self, effect: &FittedEffect) -> FittedEffect {
         effect.on(self.joints[effect.joint])
+    }
+
+    /// An effect of the whole, on a joint of the limb, as one of the limb.
+    pub(super) fn of_limb(&self, effect: &FittedEffect) -> FittedEffect {
+        let mut joints = self.joints.iter();
+        let place = joints.position(|own| *own == effect.joint);
+        effect.on(Joint::at(place.expect("it is on the limb")))
     }
 
     /// Write the declared part of a fitted limb into the whole; its added effects are returned.

@@ -6,6 +6,7 @@
 //! [`score`]. They work on a [`Problem`], which none of them changes.
 
 mod alike;
+mod bodies_off;
 mod by_log;
 mod by_motion;
 mod calibrate;
@@ -41,6 +42,7 @@ mod prepare;
 mod problem;
 mod refine;
 mod request;
+mod scale_of_gains;
 mod scale_told;
 mod scaled_bodies;
 mod score;

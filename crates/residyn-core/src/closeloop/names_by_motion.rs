@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::alike::usual;
-use super::by_motion::{Comparison, by_limbs, estimate};
+use super::by_motion::{Comparison, estimate};
 use super::establish::Standing;
 use super::judge::{Found, mark};
 use super::limbs::Limb;
@@ -28,13 +28,9 @@ struct Doubt {
 impl Found<'_> {
     /// Replace effects by what their joint's like have, or by a simpler one that they contain, where that predicts the
     /// motion as well.
-    pub(super) fn decide_by_motion(&mut self) {
-        if !self.problem.is_by_law() {
-            return;
-        }
+    pub(super) fn decide_by_motion(&mut self, limbs: &[Limb]) {
         let doubts = self.doubts();
         let model = &self.chosen.after.model;
-        let limbs = by_limbs(&self.problem, model);
         let decided = limbs.par_iter().flat_map_iter(|limb| {
             let is_own = |doubt: &&Doubt| limb.joints().contains(&doubt.instead.joint);
             let own: Vec<Doubt> = doubts.iter().filter(is_own).cloned().collect();
@@ -101,8 +97,7 @@ impl Found<'_> {
                 continue;
             }
             let mut other = best.clone();
-            let joint = other.effects[place(doubt.place)].joint;
-            other.effects[place(doubt.place)] = doubt.instead.on(joint);
+            other.effects[place(doubt.place)] = limb.of_limb(&doubt.instead);
             let Ok(other) = estimate(&trial, &other) else {
                 continue;
             };

@@ -10,7 +10,7 @@ use super::outcome::Diagnostics;
 use super::prepare::Prepared;
 use super::problem::Problem;
 use super::refine::Refined;
-use super::scale_told::report_scale;
+use super::scale_told::{report_scale, report_scaled_limbs};
 use super::select::is_of_too_many;
 use crate::data::{Audit, Finding, Repeated, Severity, report_repeats};
 use crate::model::Model;
@@ -52,6 +52,7 @@ pub(super) fn noted(
     report_measured(problem, &mut of_train);
     report_drive_gain(problem.declared, &refined.after.model, &mut of_train);
     report_scale(problem, &found.chosen.after, &mut of_train);
+    report_scaled_limbs(problem, &refined.after.model, &mut of_train);
     // Logs on which the model diverges cannot show external forces.
     let residual = diagnostics.after.as_ref().ok();
     let pushed = residual

@@ -45,11 +45,12 @@ pub fn solve(
 ) -> Result<Outcome, StudyError> {
     let declared = fit(prepared, watch)?;
     let mut found = find(declared, &prepared.test.for_fits, rng, watch)?;
-    found.decide_by_motion();
-    found.add_friction_by_motion();
+    let limbs = found.problem.limbs_by_motion();
+    found.decide_by_motion(&limbs);
+    found.add_friction_by_motion(&limbs);
     let alternatives = discriminate(&found, watch);
     let mut refined = refine(&found, watch);
-    refined.estimate_by_motion();
+    refined.estimate_by_motion(&limbs);
     refined.tie();
     found.chosen.confirm(&mut refined);
     let diagnostics = Diagnostics::of(&found, &refined);

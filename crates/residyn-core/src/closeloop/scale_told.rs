@@ -3,9 +3,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::bodies_off::BodiesOff;
+use super::drive_gain::LEAST;
 use super::fitted::Fitted;
 use super::problem::Problem;
-use crate::data::{Audit, Finding, Log, Severity};
+use crate::data::{Audit, Finding, Joint, Log, Severity};
 use crate::decomposition::eigen;
 use crate::identify::with_unit_diagonal;
 use crate::model::Model;
@@ -40,6 +42,34 @@ pub(super) fn report_scale(problem: &Problem<'_>, fitted: &Fitted, audits: &mut 
         if let (false, Some(audit)) = (names.is_empty(), audits.first_mut()) {
             let text = format!("{SCALE_OF}{}: {text}", names.join(", "));
             audit.add(Finding::new(Severity::Info, text));
+        }
+    }
+}
+
+/// Report in the first log's audit the limbs whose bodies are all off the declared ones by one factor, if nothing tells it
+/// from one of the gains of all their drives.
+pub(super) fn report_scaled_limbs(problem: &Problem<'_>, fitted: &Model, audits: &mut [Audit]) {
+    let mut logs = problem.logs.iter();
+    if !problem.is_by_law() || logs.any(|log| problem.declared.has_known_load(log)) {
+        return;
+    }
+    for joints in problem.declared.limbs() {
+        let bodies = BodiesOff::of(&problem.declared.limb(&joints), fitted);
+        let common = bodies.common();
+        let p_value = bodies.p_of_nearer(bodies.beside(common), bodies.beside(0.0), 1);
+        let is_shown = p_value < problem.settings.establish.uncorrected_false_alarm;
+        if !is_shown || common.abs() < LEAST.ln_1p() {
+            continue;
+        }
+        let (factor, joints) = (common.exp(), joints.iter().map(Joint::to_string));
+        let text = format!(
+            "the bodies that joints {} move are all about {factor:.2} times as heavy as declared: if they are as declared, the \
+             gains of all these drives are {:.2} times those in the file. A known load in some of the logs would tell which",
+            joints.collect::<Vec<_>>().join(", "),
+            1.0 / factor,
+        );
+        if let Some(audit) = audits.first_mut() {
+            audit.add(Finding::new(Severity::Warning, text));
         }
     }
 }

@@ -34,7 +34,7 @@ pub(super) fn searched<'a>(
     rng: &mut impl Rng,
     watch: &dyn Watch,
 ) -> Result<Searched<'a>, StudyError> {
-    let found = Searched::by(declared.clone(), apart, rng, watch)?;
+    let found = Searched::by(declared.clone(), apart, rng, watch)?.at_likelier_scale(watch);
     if !found.has_gains_of_bodies() {
         return Ok(found);
     }

@@ -18,13 +18,10 @@ pub(super) fn answer(report: &Report) -> Vec<Block> {
 }
 
 pub(super) fn card(report: &Report, effect: &EffectEntry) -> Block {
-    let error = match report.compared {
-        ErrorModel::OutputError => "position error on the test logs, at the middle horizon,",
-        ErrorModel::InverseDynamics => "torque error on the test logs",
-    };
     let evidence = format!(
-        "{}. Share of the {error} that it removes, compared with a refit without it: {}.",
+        "{}. Share of the {}, compared with a refit without it: {}.",
         p_value(effect.p_value),
+        error(report, effect),
         removed(effect)
     );
     let card = vec![
@@ -47,9 +44,23 @@ fn added(effect: &EffectEntry) -> Block {
     }
 }
 
-/// The share of the error on the test logs that an effect removes.
+/// The error that shows an effect.
+fn error(report: &Report, effect: &EffectEntry) -> &'static str {
+    match report.compared {
+        _ if effect.motion_reduction.is_some() => {
+            "squared error of the motion under the commands that it removes on the training logs"
+        }
+        ErrorModel::OutputError => {
+            "position error on the test logs, at the middle horizon, that it removes"
+        }
+        ErrorModel::InverseDynamics => "torque error on the test logs that it removes",
+    }
+}
+
+/// The share of that error which an effect removes.
 fn removed(effect: &EffectEntry) -> String {
-    match (effect.error_reduction, &effect.error_reduction_failure) {
+    let share = effect.motion_reduction.or(effect.error_reduction);
+    match (share, &effect.error_reduction_failure) {
         (Some(part), _) => reduction(part, "error"),
         (None, failure) => format!(
             "not computed (refit without it: {})",

@@ -23,6 +23,8 @@ pub struct Finding {
     pub p_value: f64,
     /// Share of the compared error on the test logs that this effect alone removes, or why the refit without it failed.
     pub error_reduction: Result<f64, FitError>,
+    /// Share of the loss of the motion under the commands that the effect removes, if the motion asked for it.
+    pub motion_reduction: Option<f64>,
     pub status: Status,
     /// Why it is not established, in a sentence.
     pub reason: Option<String>,
@@ -89,6 +91,7 @@ pub(in crate::closeloop) fn findings(
             parameters,
             p_value: refined.p_value(k).unwrap_or(standing.p_value),
             error_reduction: less.as_ref().map(reduction).map_err(Clone::clone),
+            motion_reduction: standing.gain_by_motion,
             status: standing.status,
             reason: standing.reason.clone(),
         }

@@ -30,6 +30,7 @@ pub(super) use self::losses::Losses;
 pub(super) use self::open_loop_check::is_worse;
 pub use self::rivals::Rival;
 pub(super) use self::rivals::rivals;
+pub(super) use self::scale::gains_relative_to;
 pub use self::screen::screen;
 pub use self::search::{Round, Selected, Tried, select};
 pub(super) use self::search::{select_beginning_with, select_from};

@@ -12,18 +12,8 @@ pub(super) fn at_other_scales(declared: &Model, added: &[FittedEffect]) -> Vec<V
     if !has_free_scale(declared) {
         return Vec::new();
     }
-    let of_joint = |joint| {
-        let own = gains.iter().find(|own| own.joint == joint);
-        own.and_then(factor).unwrap_or(1.0)
-    };
     let relative_to = |reference: &FittedEffect| {
-        let scale = factor(reference)?;
-        let relative = |joint| {
-            let gain = FittedEffect::absent(&reference.effect, joint);
-            with_factor(gain, of_joint(joint) / scale)
-        };
-        let all: Option<Vec<_>> = Joint::all(declared.joints).map(relative).collect();
-        let mut all = all?;
+        let mut all = gains_relative_to(reference, &gains, declared.joints)?;
         let off = |own: &FittedEffect| factor(own).map_or(0.0, |factor| factor.ln().abs());
         all.sort_by(|a, b| off(b).total_cmp(&off(a)));
         all.truncate(gains.len() - 1);
@@ -33,6 +23,25 @@ pub(super) fn at_other_scales(declared: &Model, added: &[FittedEffect]) -> Vec<V
         are_free.then(|| [others.as_slice(), &all].concat())
     };
     gains.iter().filter_map(relative_to).collect()
+}
+
+/// The gains of all other drives at the scale at which one of a machine's gains is none.
+pub(in crate::closeloop) fn gains_relative_to(
+    reference: &FittedEffect,
+    gains: &[FittedEffect],
+    joints: usize,
+) -> Option<Vec<FittedEffect>> {
+    let scale = factor(reference)?;
+    let of_joint = |joint| {
+        let own = gains.iter().find(|own| own.joint == joint);
+        own.and_then(factor).unwrap_or(1.0)
+    };
+    let others = Joint::all(joints).filter(|joint| *joint != reference.joint);
+    let relative = |joint| {
+        let gain = FittedEffect::absent(&reference.effect, joint);
+        with_factor(gain, of_joint(joint) / scale)
+    };
+    others.map(relative).collect()
 }
 
 /// Whether a fit may change masses, inertias or frictions.
