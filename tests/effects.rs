@@ -321,7 +321,7 @@ fn torque_effects_come_before_forces_and_in_their_order() {
 
 #[test]
 fn every_effect_file_is_tested_here() {
-    // Effects with memory and effects of the sensor are tested in memory.rs; a tilt, a rotor, a coupling, a payload and
+    // Effects with states are tested in internal_states.rs, with memory and of the sensor in memory.rs; a tilt, a rotor, a coupling, a payload and
     // an offset above.
     let elsewhere = [
         "gravity_tilt",
@@ -333,6 +333,9 @@ fn every_effect_file_is_tested_here() {
         "actuator_delay",
         "actuator_lag",
         "backlash",
+        "presliding",
+        "thermal_friction",
+        "cable_hysteresis",
     ];
     for effect in Library::built_in().effects() {
         let is_here = meaning(effect, &values(effect, 7), [0.0; 3]).is_some();

@@ -31,6 +31,7 @@ mod functions;
 mod golden;
 mod gradients;
 mod identify;
+mod internal_states;
 mod interrupts;
 mod layout;
 mod like_joints;

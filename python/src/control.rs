@@ -67,7 +67,7 @@ impl Planned<'_> {
     fn predictor(&self, task: &Task) -> PyResult<Predictor> {
         match self {
             Self::Model(model) => {
-                model.inner.runs_without_logs("a planner").or_raise()?;
+                model.inner.stands_alone("a planner").or_raise()?;
                 let dynamics = model.inner.dynamics();
                 Ok(Predictor::of_equations(dynamics, task.integrator))
             }

@@ -158,7 +158,7 @@ fn write_into(arguments: &Arguments, file: &Path) -> Result<Answer> {
         unreachable!("clap refuses a checkpoint beside --into");
     };
     let model = read_model(model, &arguments.effects.library()?)?;
-    model.runs_without_logs("a robot description")?;
+    model.stands_alone("a robot description")?;
     let WrittenBack { text, not_carried } = write_back(&model, file, arguments.tip.as_deref())?;
     prepare(arguments, &not_carried)?;
     write_whole(&arguments.out, text.as_bytes())?;

@@ -116,15 +116,21 @@ pub fn catalog(sign: SignForm) -> Vec<Case> {
     cases
 }
 
-/// Inputs of a program of dynamics: states, torques, time, parameters, all exact in f32.
+/// Inputs of a program of dynamics: states, torques, time, what describes the step, parameters, all exact in f32.
 ///
 /// Parameters vary by a quarter about their declared or typical values: masses stay positive, and the number of cogs
 /// need not be whole.
 pub fn point(dynamics: &Dynamics, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let n = dynamics.joints;
-    let bounds = [vec![3.0; n], vec![4.0; n], vec![2.0; n]].concat();
+    let layout = dynamics.layout();
+    let internal = vec![0.02; layout.internal().len()];
+    let bounds = [vec![3.0; n], vec![4.0; n], internal, vec![2.0; n]].concat();
     let mut inputs: Vec<f64> = bounds.iter().map(|b| rng.random_range(-b..*b)).collect();
     inputs.push(rng.random_range(0.0..5.0));
+    if !layout.internal().is_empty() {
+        inputs.extend(inputs[layout.internal()].to_vec());
+        inputs.push(rng.random_range(0.001..0.02));
+    }
     for parameter in &dynamics.parameters {
         inputs.push(parameter.value * rng.random_range(0.75..1.25));
     }

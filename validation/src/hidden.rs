@@ -9,6 +9,7 @@ use super::machine::Machine;
 use super::mechanics::Mechanics;
 use super::presliding::Presliding;
 use super::transmission::Transmission;
+use super::warming::Warming;
 use residyn_core::data::Joint;
 
 /// `coulomb_friction@1`; for a shift, `parameter_shift(m1)`.
@@ -101,8 +102,20 @@ impl Machine {
         let drive = &mut self.drives[j];
         match hidden.name.as_str() {
             "presliding" => {
-                let (level, stiffness) = (n("F_c")?, n("sigma")?);
+                let (level, stiffness) = (n("F_c")?, n("sigma_0")?);
                 self.presliding.push((j, Presliding { level, stiffness }));
+            }
+            "cable_hysteresis" => {
+                let (level, way) = (n("F")?, n("alpha")?);
+                let stiffness = level / way;
+                self.presliding.push((j, Presliding { level, stiffness }));
+                let mut spring = |name: &str| if name == "k" { n("k") } else { Ok(0.0) };
+                let spring = Law::of(SMOOTH, "joint_spring", &mut spring)?;
+                self.smooth.extend(spring.map(|law| (j, law)));
+            }
+            "thermal_friction" => {
+                let (share, time) = (n("a")?, n("T")?);
+                self.warming[j] = Some(Warming { share, time });
             }
             "gravity_tilt" if j == 0 => self.tilt += n("delta")?,
             "rotor_inertia" => self.rotor[j] += n("J")?,
@@ -163,6 +176,11 @@ mod tests {
 
     /// Change of the first joint's acceleration due to this effect, at one state and torque.
     fn adds(effect: &Hidden) -> f64 {
+        adds_all(std::slice::from_ref(effect))
+    }
+
+    /// The same of several effects.
+    fn adds_all(effects: &[Hidden]) -> f64 {
         let state = State {
             q: [0.4, 0.3],
             v: [1.5, -0.5],
@@ -181,7 +199,7 @@ mod tests {
             let directions = machine.directions(0.2, &state, &commands);
             machine.slope(0.2, &state, &commands, directions).v[0]
         };
-        acceleration(std::slice::from_ref(effect)) - acceleration(&[])
+        acceleration(effects) - acceleration(&[])
     }
 
     #[test]
@@ -207,7 +225,11 @@ mod tests {
             hidden("actuator_saturation", &[("m", 1.5)]),
             hidden("cubic_damping", &[("c", 0.1)]),
             hidden("uneven_friction", &[("F", 0.1), ("a", 0.5)]),
-            hidden("presliding", &[("F_c", 0.2), ("sigma", 10.0)]),
+            hidden("presliding", &[("F_c", 0.2), ("sigma_0", 10.0)]),
+            hidden(
+                "cable_hysteresis",
+                &[("k", 0.1), ("F", 0.2), ("alpha", 0.02)],
+            ),
             hidden("back_emf_limit", &[("m", 2.0), ("k", 0.1)]),
             hidden("torque_speed_limit", &[("tau_max", 2.0), ("v_0", 12.0)]),
         ];
@@ -222,6 +244,10 @@ mod tests {
                 "fractional_ripple",
                 &[("A", 0.1), ("N", 2.5), ("phase", 0.0)],
             ),
+            hidden(
+                "gear_ripple",
+                &[("A", 0.1), ("c", 0.1), ("N", 3.0), ("phase", 0.0)],
+            ),
             hidden("actuator_gain", &[("g", 0.1)]),
             hidden(
                 "periodic_disturbance",
@@ -231,6 +257,28 @@ mod tests {
         for effect in &along {
             assert!(adds(effect) > 1e-3, "{effect:?}: {}", adds(effect));
         }
+    }
+
+    #[test]
+    fn a_warm_machine_has_less_friction_and_is_otherwise_the_same() {
+        let warming = hidden("thermal_friction", &[("a", 0.5), ("T", 1e-3)]);
+        let friction = hidden("coulomb_friction", &[("F_c", 0.2)]);
+        let viscous = hidden("viscous_friction", &[("b", 0.1)]);
+        let bristles = hidden("presliding", &[("F_c", 0.2), ("sigma_0", 10.0)]);
+        let spring = hidden("joint_spring", &[("k", 0.1), ("q_0", 0.0)]);
+        let accelerations = |effects: &[&Hidden]| {
+            let effects: Vec<Hidden> = effects.iter().map(|effect| (*effect).clone()).collect();
+            adds_all(&effects)
+        };
+        for one in [&friction, &viscous, &bristles] {
+            let (cold, warm) = (accelerations(&[one]), accelerations(&[one, &warming]));
+            assert!((warm - 0.5 * cold).abs() < 1e-9, "{one:?}: {warm} {cold}");
+        }
+        let (alone, warm) = (
+            accelerations(&[&spring]),
+            accelerations(&[&spring, &warming]),
+        );
+        assert_eq!(alone, warm);
     }
 
     #[test]

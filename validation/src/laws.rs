@@ -36,6 +36,9 @@ pub const SMOOTH: &[Entry] = &[
     ("constant_torque", &["tau_0"], |n, _| n[0]),
     ("cogging_torque", &["A", "N", "phase"], ripple),
     ("fractional_ripple", &["A", "N", "phase"], ripple),
+    ("gear_ripple", &["A", "c", "N", "phase"], |n, at| {
+        (n[0] + n[1] * at.load.abs()) * (n[2] * at.q + n[3]).sin()
+    }),
     ("periodic_disturbance", &["A", "f", "phase"], |n, at| {
         n[0] * (std::f64::consts::TAU * n[1] * at.t + n[2]).sin()
     }),
@@ -99,6 +102,15 @@ impl Law {
         law.transpose()
     }
 
+    /// Whether the speed changes it.
+    pub fn is_friction(&self) -> bool {
+        let at = |v: f64| {
+            let at = At { v, ..At::default() };
+            self.at(at)
+        };
+        at(1.0) != at(0.0)
+    }
+
     /// Its torque \[N m\].
     pub fn at(&self, at: At) -> f64 {
         (self.formula)(&self.numbers, at)
@@ -153,6 +165,12 @@ mod tests {
                 0.1 * 1.7_f64.sin(),
             ),
             ("periodic_disturbance", &[0.1, 0.25, 0.0], fast, 0.1),
+            (
+                "gear_ripple",
+                &[0.1, 0.5, 5.0, 0.2],
+                At { load: -0.4, ..fast },
+                0.3 * 1.7_f64.sin(),
+            ),
         ] {
             assert_at(SMOOTH, effect, numbers, at, wanted);
         }

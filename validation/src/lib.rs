@@ -30,6 +30,7 @@ mod rows;
 mod sensors;
 mod table;
 mod transmission;
+mod warming;
 mod wires;
 
 pub use arm::{Arm, Lacks};

@@ -5,6 +5,7 @@ use super::laws::{At, Law};
 use super::mechanics::{Mechanics, Pair};
 use super::presliding::Presliding;
 use super::transmission::Transmission;
+use super::warming::Warming;
 
 /// A rig with its undeclared effects.
 #[derive(Debug, Clone)]
@@ -18,6 +19,8 @@ pub struct Machine {
     pub smooth: Vec<(usize, Law)>,
     pub dry: Vec<(usize, Law)>,
     pub presliding: Vec<(usize, Presliding)>,
+    /// Of all friction of a joint.
+    pub warming: [Option<Warming>; 2],
     pub transmissions: [Option<Transmission>; 2],
     pub drives: [Drive; 2],
     /// Amount by which each encoder reads high \[rad\]: the parts that follow the sine and the cosine of its angle.
@@ -62,6 +65,8 @@ pub(super) type Directions = Pair;
 
 /// The torques at one instant, without dry friction.
 pub(super) struct Balance {
+    /// In s.
+    time: f64,
     mass: [Pair; 2],
     /// Torque on each joint \[N m\].
     free: Pair,
@@ -80,6 +85,7 @@ impl Machine {
             smooth: Vec::new(),
             dry: Vec::new(),
             presliding: Vec::new(),
+            warming: [None, None],
             transmissions: [None, None],
             drives: [Drive::default(), Drive::default()],
             eccentricity: [[0.0; 2]; 2],
@@ -117,6 +123,7 @@ impl Machine {
         let mut mass = self.mechanics.mass(state.q);
         let bias = self.mechanics.bias(state.q, state.v, self.tilt);
         let mut balance = Balance {
+            time,
             mass,
             free: [-bias[0], -bias[1]],
             load: [0.0; 2],
@@ -140,15 +147,21 @@ impl Machine {
             balance.free[j] += balance.load[j];
         }
         for (j, law) in &self.smooth {
-            balance.free[*j] += law.at(At {
+            let torque = law.at(At {
                 q: state.q[*j],
                 v: state.v[*j],
                 t: time,
+                load: balance.load[*j],
                 ..At::default()
             });
+            balance.free[*j] += match law.is_friction() {
+                true => torque * self.friction_left(*j, time),
+                false => torque,
+            };
         }
         for (j, friction) in &self.presliding {
-            balance.free[*j] += friction.torque(state.bristle[*j]);
+            let torque = friction.torque(state.bristle[*j]);
+            balance.free[*j] += torque * self.friction_left(*j, time);
             balance.bristle_rate[*j] = friction.rate(state.bristle[*j], state.v[*j]);
         }
         balance.mass = mass;
@@ -162,12 +175,18 @@ impl Machine {
             let [first, second] = balance.mass[j];
             let inertial = first * acceleration[0] + second * acceleration[1];
             let direction = state.v[j].signum();
-            inertial - balance.free[j] + direction * self.level(j, direction, state, 0.0)
+            inertial - balance.free[j] + direction * self.level(j, direction, state, [time, 0.0])
         })
     }
 
-    /// Total dry-friction level of a joint against motion in `direction` \[N m\].
-    fn level(&self, joint: usize, direction: f64, state: &State, load: f64) -> f64 {
+    /// What is left of a joint's friction at a time \[s\], as a share.
+    fn friction_left(&self, joint: usize, time: f64) -> f64 {
+        let warming = self.warming[joint].as_ref();
+        warming.map_or(1.0, |warming| warming.left(time))
+    }
+
+    /// Total dry-friction level of a joint against motion in `direction` \[N m\], at a time and under a load.
+    fn level(&self, joint: usize, direction: f64, state: &State, [time, load]: [f64; 2]) -> f64 {
         let own = self.dry.iter().filter(|(of, _)| *of == joint);
         let at = At {
             q: state.q[joint],
@@ -176,7 +195,8 @@ impl Machine {
             direction,
             ..At::default()
         };
-        own.map(|(_, law)| law.at(at)).sum()
+        let level: f64 = own.map(|(_, law)| law.at(at)).sum();
+        level * self.friction_left(joint, time)
     }
 
     /// Accelerations while the joints move in these directions; held joints have none.
@@ -188,7 +208,8 @@ impl Machine {
     ) -> (Pair, Pair) {
         let acting = [0, 1].map(|j| {
             let direction = directions[j];
-            balance.free[j] - direction * self.level(j, direction, state, balance.load[j])
+            balance.free[j]
+                - direction * self.level(j, direction, state, [balance.time, balance.load[j]])
         });
         let free = [0, 1].map(|j| directions[j] != 0.0 || !self.has_dry_friction(j));
         let a = solve(&balance.mass, acting, free);
@@ -235,7 +256,7 @@ impl Machine {
                 return directions[j] * a[j] > 0.0;
             }
             let push = held[j].signum();
-            held[j].abs() <= self.level(j, push, state, balance.load[j])
+            held[j].abs() <= self.level(j, push, state, [balance.time, balance.load[j]])
         })
     }
 

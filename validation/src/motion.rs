@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn presliding_friction_springs_back() {
         let machine = Machine::bare(pendulum())
-            .hiding(0, "presliding", &[("F_c", 0.5), ("sigma", 20.0)])
+            .hiding(0, "presliding", &[("F_c", 0.5), ("sigma_0", 20.0)])
             .hiding(0, "viscous_friction", &[("b", 2.0)]);
         let mut state = State::at_rest([0.0; 2]);
         machine.advance(&mut state, 0.0, 5.0, &constant([0.2, 0.0]), STEP_S);

@@ -106,7 +106,7 @@ impl ExportModel {
     /// # Errors
     /// The first column that it reads.
     pub fn check_measured(&self) -> Result<(), ModelError> {
-        self.system.runs_without_logs("an exported file")
+        self.system.stands_alone("an exported file")
     }
 
     /// The same model with a task.

@@ -74,13 +74,13 @@ fn share(bodies: &Model, smooth: &Smooth, settings: &NoteSettings) -> Option<f64
         tau: none.clone(),
         ..smooth.clone()
     };
-    let moving = balance_of(&balance, &unforced);
+    let moving = balance_of(&balance, &unforced, &[]);
     let at_rest = Smooth {
         qd: none.clone(),
         qdd: none,
         ..unforced
     };
-    let gravity = balance_of(&balance, &at_rest);
+    let gravity = balance_of(&balance, &at_rest, &[]);
     let of_joint = |j: usize| {
         let column = |of: &dyn Fn(usize) -> f64| DVector::from_fn(rows, |row, _| of(row));
         let weight = column(&|row| gravity[j][row]);

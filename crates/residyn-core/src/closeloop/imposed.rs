@@ -93,7 +93,7 @@ fn inertial_torques(balance: &Dynamics, moving: &Smooth) -> Vec<Vec<f64>> {
         qdd: none,
         ..moving.clone()
     };
-    let [with, without] = [moving, steady].map(|of| balance_of(balance, &of));
+    let [with, without] = [moving, steady].map(|of| balance_of(balance, &of, &[]));
     let beyond = |(with, without): (&Vec<f64>, &Vec<f64>)| {
         with.iter()
             .zip(without)

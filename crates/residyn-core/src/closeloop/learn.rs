@@ -134,8 +134,12 @@ pub fn learn(
     rng: &mut impl Rng,
     watch: &dyn Watch,
 ) -> Option<Learned> {
-    // A network is trained on motion.
-    let learner = learner.filter(|_| refined.problem.error_model == ErrorModel::OutputError)?;
+    // A network is trained on motion, and knows no internal states.
+    let learner = learner.filter(|_| {
+        let problem = &refined.problem;
+        let has_states = !refined.after.model.layout().internal().is_empty();
+        problem.error_model == ErrorModel::OutputError && !has_states
+    })?;
     let (problem, fitted) = (&refined.problem, &refined.after);
     let mut tell = |text: &str| {
         let text = format!("{}, {text}", Stage::Learn.text());

@@ -11,7 +11,7 @@ use crate::identify::{
     Fit, FitError, Identifiability, LevenbergMarquardt, Shooting, Solver, Values, cut, fit_below,
     fit_by, free_parameters,
 };
-use crate::model::{Dynamics, Effect, FittedEffect, Library, Model, Parameter};
+use crate::model::{Dynamics, Effect, FittedEffect, Library, Logged, Model, Parameter};
 
 /// A declared model, the effects that it may lack, and the logs to learn from, with what follows from them.
 ///
@@ -172,8 +172,13 @@ impl<'a> Problem<'a> {
 
     /// An effect with bounds and starting values in a joint's own units.
     pub fn measured(&self, effect: &Effect, joint: Joint) -> Effect {
-        let reversal = self.smoothing_velocities[joint];
-        effect.measured_by(reversal, self.top_speed[joint], self.top_torque[joint])
+        let durations = self.logs.iter().map(Log::duration);
+        effect.measured_by(&Logged {
+            reversal: self.smoothing_velocities[joint],
+            top_speed: self.top_speed[joint],
+            top_torque: self.top_torque[joint],
+            duration_s: durations.fold(0.0, f64::max),
+        })
     }
 
     /// The effects that the model may lack.

@@ -208,6 +208,17 @@ impl Smoothing {
         passed.map(at_used).collect()
     }
 
+    /// Channels with values at the rows of a stretch of the log, in the same way.
+    pub fn sampled_in(&self, stretch: &Stretch, channels: &[&[f64]]) -> Vec<Vec<f64>> {
+        let mean = |pair: &[f64]| 0.5 * (pair[0] + pair[1]);
+        let means = |channel: &&[f64]| -> Vec<f64> {
+            let steps = channel.windows(2).map(mean);
+            steps.chain(channel.last().copied()).collect()
+        };
+        let means: Vec<Vec<f64>> = channels.iter().map(means).collect();
+        self.held_in(stretch, &means)
+    }
+
     /// The torques of a joint at the rows that are used, each taken at the time at which it acted.
     pub fn torques(&self, log: &Log, joint: usize) -> Vec<f64> {
         match log.torque {

@@ -33,6 +33,34 @@ impl Program {
         self.outputs.len()
     }
 
+    /// For each input whether an output depends on it.
+    pub fn inputs_read(&self) -> Vec<bool> {
+        let mut read = vec![false; self.inputs.len()];
+        let needed = needed(&self.ops, &self.outputs);
+        for op in self
+            .ops
+            .iter()
+            .zip(needed)
+            .filter_map(|(op, needed)| needed.then_some(op))
+        {
+            if let Op::Input(input) = op {
+                read[*input as usize] = true;
+            }
+        }
+        read
+    }
+
+    /// The same program with one of its outputs alone.
+    #[must_use]
+    pub fn of_output(&self, output: usize) -> Self {
+        Self::compact(
+            self.ops.clone(),
+            self.inputs.clone(),
+            self.labels.clone(),
+            &self.outputs[output..=output],
+        )
+    }
+
     /// Keep the operations that the outputs need, and all inputs, whose numbering callers rely on. Inputs come first, then
     /// constants, then all other operations, so that an evaluator sets the first two once.
     pub(super) fn compact(

@@ -10,7 +10,7 @@ use crate::data::{Joint, Log, Measured, Smooth, Smoothing, row_from};
 use crate::expr::{Program, Tape};
 use crate::lanes::Row;
 use crate::model::{Dynamics, Filter};
-use crate::sim::{Commands, Mean, Point, Window};
+use crate::sim::{Commands, Course, Mean, Point, Window};
 
 /// A log as the torque error reads it, thinned out.
 pub(super) struct Rows {
@@ -35,24 +35,35 @@ impl Rows {
     }
 }
 
-/// What each log gives at its rows, `[log][channel][row]`: the torques that act, then the model's further measured
-/// columns; and the slopes of the torques with respect to the parameters of some filters, `[log][filter][row]`.
+/// What each log gives at its rows.
 pub(super) struct Acting {
-    given: Vec<Vec<Vec<f64>>>,
-    slopes: Vec<Vec<Vec<f64>>>,
+    logs: Vec<ActingIn>,
+}
+
+/// What one log gives, `[channel][row]`.
+#[derive(Default)]
+struct ActingIn {
+    /// The model's internal states.
+    internal: Vec<Vec<f64>>,
+    /// The torques that act, then the model's further measured columns.
+    given: Vec<Vec<f64>>,
+    /// The slopes of the torques with respect to the parameters of some filters, then those of the internal states with
+    /// respect to parameters.
+    slopes: Vec<Vec<f64>>,
 }
 
 /// Time constants after which a lag has forgotten a command.
 const FORGOTTEN: f64 = 30.0;
 
 impl Acting {
-    /// With the slopes of all of the model's filters, or of none. Logs of which no window is used give nothing, and rows
+    /// With the course of the internal states in each log, if there are any, and with the slopes of all of the model's filters
+    /// or of none. Logs of which no window is used give nothing, and rows
     /// outside the windows of a log do not matter.
     pub fn of(
         dynamics: &Dynamics,
         values: &Values,
         (logs, rows, windows): (&[Log], &[Rows], &[Window]),
-        slopes_of: &[Filter],
+        (courses, slopes_of): (&[Course], &[Filter]),
     ) -> Self {
         let of_log = |(index, (log, rows)): (usize, (&Log, &Rows))| {
             let own = windows.iter().filter(|window| window.log == index);
@@ -62,23 +73,24 @@ impl Acting {
                 .zip(last)
                 .map_or_else(Default::default, |(first, last)| {
                     let point = Point::new(dynamics, values.of_log(index));
-                    rows.acting(&point, (log, first..=last), slopes_of)
+                    rows.acting(&point, (log, first..=last), (courses.get(index), slopes_of))
                 })
         };
         let all = logs.iter().zip(rows).enumerate().map(of_log);
-        let (given, slopes) = all.unzip();
-        Self { given, slopes }
+        Self {
+            logs: all.collect(),
+        }
     }
 }
 
 impl Rows {
-    /// What acts between two rows of the log, and its slopes by some filters, `[channel][row]` each.
+    /// What acts between two rows of the log, with its slopes by some filters.
     fn acting(
         &self,
         point: &Point<'_>,
         (log, within): (&Log, RangeInclusive<usize>),
-        slopes_of: &[Filter],
-    ) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+        (course, slopes_of): (Option<&Course>, &[Filter]),
+    ) -> ActingIn {
         let (smoothing, dynamics) = (&self.smoothing, point.dynamics);
         let constants = dynamics
             .filters
@@ -102,7 +114,17 @@ impl Rows {
         });
         let slopes: Vec<Vec<f64>> = slopes.collect();
         let given = tau.into_iter().chain(measured.into_iter().cloned());
-        (given.collect(), smoothing.held_in(&stretch, &slopes))
+        let along = |of: fn(&Course) -> &[Vec<f64>]| {
+            let channels = course.map_or(&[][..], of).iter();
+            let channels = channels.map(|channel| &channel[stretch.logged.clone()]);
+            smoothing.sampled_in(&stretch, &channels.collect::<Vec<_>>())
+        };
+        let by_filters = smoothing.held_in(&stretch, &slopes);
+        ActingIn {
+            internal: along(|course| &course.values),
+            given: given.collect(),
+            slopes: [by_filters, along(|course| &course.slopes)].concat(),
+        }
     }
 }
 
@@ -160,7 +182,7 @@ impl Balance {
     }
 
     /// Evaluate a program at each row, calling `see(lanes, tape)`, where `lanes` gives each lane's row, if it has one.
-    /// A program may take the slopes of the torques with respect to filter parameters before its parameters.
+    /// A program may take the slopes of what acts before its parameters.
     fn over_rows<'d>(
         &self,
         program: &Program,
@@ -174,11 +196,13 @@ impl Balance {
             tape.inputs()[first_parameter + parameter][lane] = value;
         });
         let of_log = |(log, Rows { smooth, .. }): (usize, &'d Rows)| -> Vec<&'d Vec<f64>> {
-            let driven = smooth.q.iter().chain(&smooth.qd).chain(&acting.given[log]);
+            let acting = &acting.logs[log];
+            let moving = smooth.q.iter().chain(&smooth.qd).chain(&acting.internal);
+            let driven = moving.chain(&acting.given);
             let timed = driven.chain([&smooth.time]).chain(&smooth.qdd);
             timed
                 .chain(&smooth.directions)
-                .chain(&acting.slopes[log])
+                .chain(&acting.slopes)
                 .collect()
         };
         // In the order of a torque balance's inputs.

@@ -3,7 +3,7 @@ use thiserror::Error;
 use super::{FitError, Shooting, fit};
 use crate::data::{Interval, Joint, Log};
 use crate::expr::Graph;
-use crate::model::{Dynamics, Parameter, PerLogValue};
+use crate::model::{Dynamics, InternalStates, Parameter, PerLogValue};
 use crate::sim::cut;
 
 /// A model with an unknown sensor offset per joint and log.
@@ -141,6 +141,18 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
             scale: 0.01,
         });
     }
+    let internal = dynamics.internal.as_ref().map(|internal| {
+        let (mut of_rates, mut of_starts) = (graph.clone(), Graph::new());
+        let names = parameters.iter().map(|parameter| &parameter.name);
+        let values: Vec<_> = names.map(|name| of_starts.input(name)).collect();
+        let rates = of_rates.append(&internal.rates, &inputs);
+        let starts = of_starts.append(&internal.starts, &values[..dynamics.parameters.len()]);
+        InternalStates {
+            rates: of_rates.finish(&rates),
+            starts: of_starts.finish(&starts),
+            ..internal.clone()
+        }
+    });
     let outputs = graph.append(&dynamics.program, &inputs);
     let reading = dynamics.reading.as_ref().map(|reading| {
         let mut graph = graph.clone();
@@ -159,6 +171,7 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         measured: dynamics.measured.clone(),
         parameters,
         program: graph.finish(&outputs),
+        internal,
         filters: dynamics.filters.clone(),
         reading,
         // The offsets replace what differs between single logs.

@@ -7,8 +7,18 @@ use super::sums::{Sums, loss};
 use super::values::Values;
 use crate::data::Log;
 use crate::lanes::Row;
-use crate::model::Dynamics;
-use crate::sim::{Commands, FIT_S, Hold, Point, RK4, Simulator, Window, substeps};
+use crate::model::{Dependence, Dynamics};
+use crate::sim::{
+    Commands, Course, FIT_S, Hold, InternalRates, InternalStart, Point, RK4, Simulator, Window,
+    substeps,
+};
+
+/// What the logs give a model at some values of its parameters: filtered torques, and the course of its internal states
+/// if it has any.
+pub(super) struct Given<'l> {
+    pub commands: Vec<Commands<'l>>,
+    pub courses: Vec<Course>,
+}
 
 /// Up to [`LANES`] windows integrated side by side. Shorter windows are padded with steps of zero length and rows of
 /// zero weight.
@@ -136,17 +146,28 @@ impl Pack {
         Commands::just_before(self.logs.map(|log| &commands[log]), self.at[row])
     }
 
+    /// The internal states at the windows' starts.
+    fn internal_start(&self, given: &Given<'_>, pairs: &[Dependence]) -> InternalStart<LANES> {
+        let course = |lane: usize| (&given.courses[self.logs[lane]], self.at[0][lane]);
+        match given.courses.is_empty() {
+            true => InternalStart::default(),
+            false => InternalStart::of(std::array::from_fn(course), pairs),
+        }
+    }
+
     /// Integrate the windows, calling `see(row, angles)` with the measured angles at each row.
     pub fn roll(
         &self,
         dynamics: &Dynamics,
         values: &Values,
-        commands: &[Commands<'_>],
+        given: &Given<'_>,
         start_states: &[Vec<f64>],
         mut see: impl FnMut(usize, &[Lane]),
     ) {
         let mut state = self.gather(start_states);
-        let forces = state.split_off(dynamics.states());
+        let forces = state.split_off(2 * dynamics.joints);
+        state.extend(self.internal_start(given, &[]).values);
+        let commands = &given.commands;
         let model = Point::new(dynamics, values.common.as_slice());
         let mut simulator = Simulator::<LANES>::new(&model, RK4);
         simulator.state = state;
@@ -167,13 +188,13 @@ impl Pack {
         &self,
         dynamics: &Dynamics,
         values: &Values,
-        commands: &[Commands<'_>],
+        given: &Given<'_>,
         start_states: &[Vec<f64>],
         scale: f64,
     ) -> Vec<(usize, f64)> {
         let n = dynamics.joints;
         let mut costs: Vec<(usize, f64)> = self.windows.iter().map(|&w| (w, 0.0)).collect();
-        self.roll(dynamics, values, commands, start_states, |row, angles| {
+        self.roll(dynamics, values, given, start_states, |row, angles| {
             for (lane, (window, cost)) in costs.iter_mut().enumerate() {
                 let velocities = &start_states[*window][n..];
                 for j in 0..n {
@@ -196,10 +217,11 @@ impl Pack {
         &self,
         tangent: &Tangent,
         values: &Values,
-        commands: &[Commands<'_>],
+        given: &Given<'_>,
         start_states: &[Vec<f64>],
         scale: f64,
     ) -> Vec<(usize, WindowTerms)> {
+        let commands = &given.commands;
         let (n, columns) = (tangent.joints, tangent.columns());
         let states = self.gather(start_states);
         let mut sums = Sums::new(columns);
@@ -207,7 +229,11 @@ impl Pack {
         values.by_lane(&self.logs, |parameter, lane, value| {
             stepper.set_in_lane(parameter, lane, value);
         });
-        stepper.start(&states);
+        let pairs = tangent
+            .internal
+            .as_ref()
+            .map_or(&[][..], InternalRates::pairs);
+        stepper.start(&states, &self.internal_start(given, pairs));
         for row in 0..self.rows() {
             let before = || self.torque_before(commands, row);
             let (angles, slopes) = stepper.shown(before, self.time[row]);

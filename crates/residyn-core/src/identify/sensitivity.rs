@@ -2,8 +2,8 @@ use std::ops::Range;
 
 use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::{Row, Simd, WithSimd};
-use crate::model::{Dynamics, Filter, InputLayout};
-use crate::sim::{Hold, Scheme, StepTorque};
+use crate::model::{Dependence, Dynamics, Filter, InputLayout};
+use crate::sim::{Hold, InternalRates, InternalStart, Scheme, StepTorque};
 
 /// Windows that are integrated side by side: two AVX-512 registers or four AVX2 registers of f64.
 pub(super) const LANES: usize = 16;
@@ -23,16 +23,19 @@ pub enum Local {
 /// The tangent-linear model: accelerations and their derivatives with respect to states, shared parameters and forces,
 /// as one program.
 ///
-/// Outputs: the n accelerations; per joint the derivatives of its acceleration with respect to `q` and `qd`; per active
-/// parameter, and per force if forces are free, the derivatives of all accelerations. dq/dt = qd is assumed. Of a torque
-/// balance: the n differences, then for each difference its derivatives with respect to the active parameters that it
-/// depends on. Inputs: those of the model, with the derivatives of the torques with respect to filter parameters inserted
-/// before its parameters.
+/// Outputs: the n accelerations and the rates of the internal states; for each of these slopes its derivatives with
+/// respect to the states; per active parameter, and per force if forces are free, the derivatives of all slopes; for each
+/// internal state the derivatives of its rate with respect to those at the step's start. dq/dt = qd is assumed. Of a
+/// torque balance: the n differences, then for each difference its derivatives with respect to the active parameters that
+/// it depends on. Inputs: those of the model, with the derivatives of the torques with respect to filter parameters, and
+/// in a torque balance those of the internal states with respect to parameters, inserted before its parameters.
 pub(super) struct Tangent {
     pub program: Program,
     /// The sensor model, if it is not the identity: the n measured angles; per joint their derivatives with respect to
     /// `q` and `qd`; per joint those with respect to active parameters. Inputs: those of the model.
     pub reading: Option<Program>,
+    /// How internal states and their slopes follow from a logged motion, if there are any.
+    pub internal: Option<InternalRates>,
     pub joints: usize,
     /// The inputs of the model.
     pub layout: InputLayout,
@@ -53,7 +56,11 @@ impl Tangent {
             Local::State | Local::StateAndForce => layout.parameters(),
             Local::Nothing => layout.parameters_of_balance(),
         };
-        let model = Differentiated::new(dynamics, first);
+        let pairs = match (local, &dynamics.internal) {
+            (Local::Nothing, Some(internal)) => internal.pairs.as_slice(),
+            _ => &[],
+        };
+        let model = Differentiated::new(dynamics, first, pairs);
         let (start_states, reading, (program, columns_of)) = match local {
             Local::State => (
                 2 * n,
@@ -69,9 +76,10 @@ impl Tangent {
         Self {
             program,
             reading,
+            internal: InternalRates::with_slopes(dynamics),
             joints: n,
             layout,
-            first_parameter: first + dynamics.filters.len(),
+            first_parameter: first + dynamics.filters.len() + pairs.len(),
             active: active.to_vec(),
             columns_of,
             start_states,
@@ -87,14 +95,29 @@ impl Tangent {
     /// state itself, whose slopes are the accelerations.
     #[inline(always)]
     fn direct(&self, column: usize) -> Option<usize> {
-        let (n, shared) = (self.joints, self.active.len());
-        let others = n + 2 * n * n;
+        let (n, shared, slopes) = (self.joints, self.active.len(), self.slope_count());
+        let others = slopes * (1 + self.states());
         match column.checked_sub(1) {
             None => Some(0),
-            Some(parameter) if parameter < shared => Some(others + n * parameter),
+            Some(parameter) if parameter < shared => Some(others + slopes * parameter),
             Some(state) if state < shared + 2 * n => None,
-            Some(force) => Some(others + n * (force - 2 * n)),
+            Some(force) => Some(others + slopes * (force - 2 * n)),
         }
+    }
+
+    /// Number of states of a motion, internal ones included.
+    fn states(&self) -> usize {
+        self.layout.states().len()
+    }
+
+    /// Number of slopes that the program gives: accelerations, and rates of internal states.
+    fn slope_count(&self) -> usize {
+        self.states() - self.joints
+    }
+
+    /// The output with the derivative of the k-th slope with respect to a state.
+    pub fn by_state(&self, slope: usize, state: usize) -> usize {
+        self.slope_count() + slope * self.states() + state
     }
 
     /// For a torque balance: for each joint the columns that its difference depends on, and the outputs with its slopes
@@ -118,16 +141,23 @@ struct Differentiated<'d> {
     first_parameter: usize,
     /// The derivatives of the torques with respect to filter parameters.
     slopes: Vec<Node>,
+    /// Those of internal states with respect to parameters, if the log gives the states.
+    pairs: Vec<(Dependence, Node)>,
     outputs: Vec<Node>,
 }
 
 impl<'d> Differentiated<'d> {
-    fn new(dynamics: &'d Dynamics, first_parameter: usize) -> Self {
+    fn new(dynamics: &'d Dynamics, first_parameter: usize, pairs: &[Dependence]) -> Self {
         let mut graph = Graph::new();
         let (moving, held) = dynamics.program.inputs().split_at(first_parameter);
         let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
         let slope = |filter: &Filter| graph.input(&format!("slope of {}", filter.parameter));
         let slopes = dynamics.filters.iter().map(slope).collect();
+        let pair = |pair: &Dependence| {
+            let name = format!("slope of state {} by {}", pair.state, pair.parameter);
+            (*pair, graph.input(&name))
+        };
+        let pairs = pairs.iter().map(pair).collect();
         inputs.extend(held.iter().map(|name| graph.input(name)));
         Self {
             outputs: graph.append(&dynamics.program, &inputs),
@@ -136,11 +166,12 @@ impl<'d> Differentiated<'d> {
             inputs,
             first_parameter,
             slopes,
+            pairs,
         }
     }
 
     /// The derivatives of `outputs` with respect to the inputs `states`, to the `active` parameters, which act through
-    /// filters as well, and to the inputs `forces`.
+    /// filters and given internal states as well, and to the inputs `forces`.
     fn jacobian(
         &mut self,
         outputs: &[Node],
@@ -163,18 +194,38 @@ impl<'d> Differentiated<'d> {
                 row[first_active + column] = self.graph.mul(by_torque[0], *slope);
             }
         }
+        for (Dependence { state, parameter }, slope) in &self.pairs {
+            let Some(column) = active.iter().position(|k| k == parameter) else {
+                continue;
+            };
+            let state = self.inputs[self.dynamics.layout().internal().start + state];
+            let by_state = self.graph.jacobian(outputs, &[state]);
+            for (row, by_state) in jacobian.iter_mut().zip(by_state) {
+                let through = self.graph.mul(by_state[0], *slope);
+                let own = &mut row[first_active + column];
+                *own = self.graph.add(*own, through);
+            }
+        }
         jacobian
     }
 
     /// The program of [`Tangent`] for a motion; no difference of torques depends on a column.
     fn of_motion(mut self, active: &[usize], forces: Range<usize>) -> (Program, Vec<Vec<usize>>) {
-        let accelerations = self.outputs.split_off(self.dynamics.joints);
-        let states = self.dynamics.layout().states();
-        let jacobian = self.jacobian(&accelerations, states.clone(), active, forces.clone());
+        let slopes = self.outputs.split_off(self.dynamics.joints);
+        let layout = self.dynamics.layout();
+        let states = layout.states();
+        let jacobian = self.jacobian(&slopes, states.clone(), active, forces.clone());
         let by_states = jacobian.iter().flat_map(|row| &row[states.clone()]);
         let others = states.end..states.end + active.len() + forces.len();
         let others = others.flat_map(|k| jacobian.iter().map(move |row| &row[k]));
-        let all = accelerations.iter().chain(by_states).chain(others);
+        let rates = &slopes[self.dynamics.joints..];
+        let of_starts = self.graph.jacobian(rates, &self.inputs[layout.starts()]);
+        let of_starts = of_starts.concat();
+        let all = slopes
+            .iter()
+            .chain(by_states)
+            .chain(others)
+            .chain(&of_starts);
         let all: Vec<Node> = all.copied().collect();
         (self.graph.finish(&all), Vec::new())
     }
@@ -213,19 +264,19 @@ fn reading(dynamics: &Dynamics, active: &[usize]) -> Option<Program> {
 
 /// Integrates the states and their sensitivities together.
 ///
-/// The sensitivity S of the state with respect to a column c obeys dS/dt = (df/ds) S + df/dc. Rows are positions, then
-/// velocities.
+/// The sensitivity S of the state with respect to a column c obeys dS/dt = (df/ds) S + df/dc. Rows are positions,
+/// velocities, then internal states, whose rates depend on those at the step's start as well.
 pub(super) struct TangentStepper<'t> {
     tangent: &'t Tangent,
     scheme: &'static Scheme,
     torque: StepTorque<LANES>,
     tape: Tape<f64, LANES>,
-    /// The state, then the sensitivity of each column: 2n rows each.
+    /// The state, then the sensitivity of each column: one row for each state.
     now: Vec<Lane>,
     inner: Vec<Lane>,
     next: Vec<Lane>,
     sum: Vec<Lane>,
-    /// Derivatives of the accelerations with respect to the state, `[joint * 2n + state]`.
+    /// Derivatives of the slopes with respect to the states, `[slope * states + state]`.
     by_state: Vec<Lane>,
     reading: Option<Tape<f64, LANES>>,
     /// The measured angles, then their sensitivities `[joint * columns + column]`.
@@ -237,7 +288,7 @@ impl<'t> TangentStepper<'t> {
         let n = tangent.joints;
         let first_read = tangent.layout.parameters();
         let rows = |count: usize| vec![Row::splat(0.0); count];
-        let size = 2 * n * (1 + tangent.columns());
+        let size = tangent.states() * (1 + tangent.columns());
         Self {
             tangent,
             scheme,
@@ -247,9 +298,9 @@ impl<'t> TangentStepper<'t> {
             inner: rows(size),
             next: rows(size),
             sum: rows(size),
-            by_state: rows(2 * n * n),
+            by_state: rows(tangent.slope_count() * tangent.states()),
             reading: (tangent.reading.as_ref()).map(|reading| reading.tape_at(first_read, values)),
-            shown: rows(size / 2),
+            shown: rows(n * (1 + tangent.columns())),
         }
     }
 
@@ -265,12 +316,13 @@ impl<'t> TangentStepper<'t> {
     /// until now, and the model's further measured columns.
     pub fn shown(&mut self, given: impl FnOnce() -> Vec<Lane>, time: Lane) -> (&[Lane], &[Lane]) {
         let (n, columns) = (self.tangent.joints, self.tangent.columns());
-        let (state, sensitivities) = self.now.split_at(2 * n);
+        let states = self.tangent.states();
+        let (state, sensitivities) = self.now.split_at(states);
         let (angles, slopes) = self.shown.split_at_mut(n);
         let Some(reading) = &mut self.reading else {
             angles.copy_from_slice(&state[..n]);
             for (joint, slopes) in slopes.chunks_exact_mut(columns).enumerate() {
-                for (slope, column) in slopes.iter_mut().zip(sensitivities.chunks_exact(2 * n)) {
+                for (slope, column) in slopes.iter_mut().zip(sensitivities.chunks_exact(states)) {
                     *slope = column[joint];
                 }
             }
@@ -285,14 +337,17 @@ impl<'t> TangentStepper<'t> {
         for (joint, slopes) in slopes.chunks_exact_mut(columns).enumerate() {
             angles[joint] = *reading.output(joint);
             for (column, slope) in slopes.iter_mut().enumerate() {
-                let direct = n + 2 * n * n + joint * shared + column;
+                let direct = n + n * states + joint * shared + column;
                 *slope = if column < shared {
                     *reading.output(direct)
                 } else {
                     Row::splat(0.0)
                 };
-                for (state, own) in sensitivities[2 * n * column..][..2 * n].iter().enumerate() {
-                    let by_state = reading.output(n + joint * 2 * n + state);
+                for (state, own) in sensitivities[states * column..][..states]
+                    .iter()
+                    .enumerate()
+                {
+                    let by_state = reading.output(n + joint * states + state);
                     for lane in 0..LANES {
                         slope[lane] += by_state[lane] * own[lane];
                     }
@@ -302,13 +357,22 @@ impl<'t> TangentStepper<'t> {
         (angles, slopes)
     }
 
-    /// Start at these states (`[2n][lane]`). Their sensitivity to themselves is the identity, all others are zero.
-    pub fn start(&mut self, states: &[Lane]) {
+    /// Start at this motion (`[2n][lane]`), whose sensitivity to itself is the identity, and at these internal states with
+    /// their slopes by parameters. All other sensitivities are zero.
+    pub fn start(&mut self, motion: &[Lane], internal: &InternalStart<LANES>) {
         let (n, shared) = (self.tangent.joints, self.tangent.active.len());
+        let states = self.tangent.states();
         self.now.fill(Row::splat(0.0));
-        self.now[..2 * n].copy_from_slice(&states[..2 * n]);
+        self.now[..2 * n].copy_from_slice(&motion[..2 * n]);
+        self.now[2 * n..states].copy_from_slice(&internal.values);
         for row in 0..2 * n {
-            self.now[2 * n * (1 + shared + row) + row] = Row::splat(1.0);
+            self.now[states * (1 + shared + row) + row] = Row::splat(1.0);
+        }
+        for (Dependence { state, parameter }, slope) in &internal.slopes {
+            let column = self.tangent.active.iter().position(|k| k == parameter);
+            if let Some(column) = column {
+                self.now[states * (1 + column) + 2 * n + state] = *slope;
+            }
         }
     }
 
@@ -325,12 +389,18 @@ impl<'t> TangentStepper<'t> {
 
     #[inline(always)]
     fn step<S: Simd>(&mut self, simd: S, time: &Lane, h: &Lane) {
-        let (n, layout) = (self.tangent.joints, self.tangent.layout);
+        let layout = self.tangent.layout;
+        let (slopes, states) = (self.tangent.slope_count(), self.tangent.states());
         let last = self.scheme.stages.len() - 1;
+        if !layout.internal().is_empty() {
+            let inputs = self.tape.moving();
+            inputs[layout.starts()].copy_from_slice(&self.now[layout.internal()]);
+            inputs[layout.step()] = *h;
+        }
         for (k, stage) in self.scheme.stages.iter().enumerate() {
             let inner = if k == 0 { &self.now } else { &self.inner };
             let inputs = self.tape.moving();
-            inputs[layout.states()].copy_from_slice(&inner[..2 * n]);
+            inputs[layout.states()].copy_from_slice(&inner[..states]);
             let (mut weighed, mut reached) = (*h, *h);
             for part in 0..Lane::parts::<S>() {
                 let h = h.get(simd, part);
@@ -341,7 +411,7 @@ impl<'t> TangentStepper<'t> {
             }
             self.tape.run_on(simd);
             for (k, slope) in self.by_state.iter_mut().enumerate() {
-                *slope = *self.tape.output(n + k);
+                *slope = *self.tape.output(slopes + k);
             }
             self.limit_damping(simd, h);
             // Known at compile time in each call: the loops over rows have no branches.
@@ -364,13 +434,13 @@ impl<'t> TangentStepper<'t> {
     /// grow without bound although they really vanish.
     #[inline(always)]
     fn limit_damping<S: Simd>(&mut self, simd: S, h: &Lane) {
-        let n = self.tangent.joints;
+        let (n, states) = (self.tangent.joints, self.tangent.states());
         for part in 0..Lane::parts::<S>() {
             let h = h.get(simd, part);
             // The friction of each joint gives a matrix without negative eigenvalues, none of which exceeds their sum.
             let mut all = h.like(0.0);
             for j in 0..n {
-                let damping = -(self.by_state[(2 * n + 1) * j + n].get(simd, part) * h);
+                let damping = -(self.by_state[(states + 1) * j + n].get(simd, part) * h);
                 all = all + damping.max(h.like(0.0));
             }
             let limit = h.like(self.scheme.most_damping);
@@ -379,11 +449,11 @@ impl<'t> TangentStepper<'t> {
             }
             let most = h.like(self.scheme.most_damping / n as f64);
             for j in 0..n {
-                let damping = -(self.by_state[(2 * n + 1) * j + n].get(simd, part) * h);
+                let damping = -(self.by_state[(states + 1) * j + n].get(simd, part) * h);
                 let share = most.if_less(damping, most / damping, h.like(1.0));
                 let share = limit.if_less(all, share, h.like(1.0));
                 for row in 0..n {
-                    let slope = &mut self.by_state[2 * n * row + n + j];
+                    let slope = &mut self.by_state[states * row + n + j];
                     slope.set(part, slope.get(simd, part) * share);
                 }
             }
@@ -393,9 +463,9 @@ impl<'t> TangentStepper<'t> {
     /// Move positions with the new velocities: q += h (v' - v), and the same for the sensitivities.
     #[inline(always)]
     fn move_with_new_velocities<S: Simd>(&mut self, simd: S, h: &Lane) {
-        let n = self.tangent.joints;
-        let columns = self.sum.chunks_exact_mut(2 * n);
-        let columns = self.now.chunks_exact(2 * n).zip(columns);
+        let (n, states) = (self.tangent.joints, self.tangent.states());
+        let columns = self.sum.chunks_exact_mut(states);
+        let columns = self.now.chunks_exact(states).zip(columns);
         for (now, sum) in columns {
             for part in 0..Lane::parts::<S>() {
                 for j in 0..n {
@@ -418,10 +488,11 @@ impl<'t> TangentStepper<'t> {
         reached: &Lane,
     ) {
         // With the number of joints known at compile time, the loops over rows are unrolled.
-        match self.tangent.joints {
-            1 => self.stage_of(simd, 1, is_first, is_last, weighed, reached),
-            2 => self.stage_of(simd, 2, is_first, is_last, weighed, reached),
-            n => self.stage_of(simd, n, is_first, is_last, weighed, reached),
+        match (self.tangent.joints, self.tangent.layout.internal().len()) {
+            (1, 0) => self.stage_of(simd, [1, 0], is_first, is_last, weighed, reached),
+            (2, 0) => self.stage_of(simd, [2, 0], is_first, is_last, weighed, reached),
+            (n, 0) => self.stage_of(simd, [n, 0], is_first, is_last, weighed, reached),
+            (n, m) => self.stage_of(simd, [n, m], is_first, is_last, weighed, reached),
         }
     }
 
@@ -429,19 +500,20 @@ impl<'t> TangentStepper<'t> {
     fn stage_of<S: Simd>(
         &mut self,
         simd: S,
-        n: usize,
+        [n, internal]: [usize; 2],
         is_first: bool,
         is_last: bool,
         weighed: &Lane,
         reached: &Lane,
     ) {
-        let rows = 2 * n;
+        let rows = 2 * n + internal;
+        let of_starts = self.tape.output_count() - internal * internal;
         let inner = if is_first { &self.now } else { &self.inner };
         let columns = (self.now.chunks_exact(rows))
             .zip(inner.chunks_exact(rows))
             .zip(self.next.chunks_exact_mut(rows))
             .zip(self.sum.chunks_exact_mut(rows));
-        let by_state = &self.by_state[..n * rows];
+        let by_state = &self.by_state[..(n + internal) * rows];
         for (column, (((now, inner), next), sum)) in columns.enumerate() {
             let direct = self.tangent.direct(column);
             for part in 0..Lane::parts::<S>() {
@@ -458,6 +530,13 @@ impl<'t> TangentStepper<'t> {
                             for state in 0..rows {
                                 let by_state = by_state[(row - n) * rows + state].get(simd, part);
                                 slope = by_state.mul_add(inner[state].get(simd, part), slope);
+                            }
+                            if row >= 2 * n {
+                                let first = of_starts + (row - 2 * n) * internal;
+                                for (k, start) in now[2 * n..].iter().enumerate() {
+                                    let by_start = self.tape.output(first + k).get(simd, part);
+                                    slope = by_start.mul_add(start.get(simd, part), slope);
+                                }
                             }
                         }
                         slope
@@ -511,8 +590,9 @@ mod tests {
     use super::{LANES, Local, Tangent, TangentStepper};
     use crate::data::Joint;
     use crate::lanes::Row;
-    use crate::model::{Dynamics, FittedEffect, Library};
-    use crate::sim::{Commands, Hold, Point, RK4, SCHEMES, Scheme, Simulator};
+    use crate::model::{Dependence, Dynamics, FittedEffect, Library};
+    use crate::sim::bristles;
+    use crate::sim::{Commands, Hold, InternalStart, Point, RK4, SCHEMES, Scheme, Simulator};
 
     const HELD: [f64; 2] = [0.5, -1.5];
 
@@ -520,18 +600,20 @@ mod tests {
     fn are_slopes(model: &Dynamics, start: [f64; 4], substeps: usize, scheme: &'static Scheme) {
         let active: Vec<usize> = (0..model.parameters.len()).collect();
         let tangent = Tangent::new(model, &active, Local::State);
+        let states = model.states();
         let (time, tau) = ([0.0], HELD.map(|tau| vec![tau]));
         let commands = Commands::new(model, &time, &tau);
         let end = |values: &[f64], start: &[f64]| {
             let mut simulator = Simulator::<1>::new(Point::new(model, values), scheme);
-            simulator.put(start);
+            simulator.place(start);
             let (held, from) = (HELD.map(|tau| Row([tau])), Row([0.2]));
             simulator.advance(&Hold::lasting([&commands], &held, from, 0.1, substeps));
             simulator.state.clone()
         };
         let values = model.values();
         let mut stepper = TangentStepper::new(&tangent, &values, scheme);
-        stepper.start(&start.map(Row::splat));
+        let internal = internal_start(model);
+        stepper.start(&start.map(Row::splat), &internal);
         let (held, from) = (HELD.map(Row::splat), Row::splat(0.2));
         let hold = Hold::lasting([&commands; LANES], &held, from, 0.1, substeps);
         stepper.advance(&hold);
@@ -550,7 +632,7 @@ mod tests {
             };
             for (row, (after, before)) in moved(1e-6).iter().zip(&moved(-1e-6)).enumerate() {
                 let wanted = (after[0] - before[0]) / 2e-6;
-                let found = stepper.now[4 * (1 + column) + row][3];
+                let found = stepper.now[states * (1 + column) + row][3];
                 assert!(
                     (found - wanted).abs() < 1e-8 * wanted.abs().max(1.0),
                     "{}, column {column}, state {row}: {found} {wanted}",
@@ -560,12 +642,46 @@ mod tests {
         }
     }
 
+    /// Internal states as before a log, which are linear in the parameters.
+    fn internal_start(model: &Dynamics) -> InternalStart<LANES> {
+        let Some(internal) = &model.internal else {
+            return InternalStart::default();
+        };
+        let values = model.values();
+        let slope = |pair: &Dependence| {
+            let mut moved = values.clone();
+            moved[pair.parameter] += 1.0;
+            let [before, after] =
+                [&values, &moved].map(|values| model.internal_starts(values)[pair.state]);
+            (*pair, Row::splat(after - before))
+        };
+        InternalStart {
+            slopes: internal.pairs.iter().map(slope).collect(),
+            values: model
+                .internal_starts(&values)
+                .into_iter()
+                .map(Row::splat)
+                .collect(),
+        }
+    }
+
     #[test]
     fn sensitivities_are_the_slopes_of_every_schemes_steps() {
         let acrobot = Library::built_in().model("acrobot").unwrap();
         let model = acrobot.with_smoothing_velocities(vec![0.0; 2]).dynamics();
         for scheme in SCHEMES {
             are_slopes(&model, [0.7, -0.4, 1.5, -2.0], 3, scheme);
+        }
+    }
+
+    #[test]
+    fn sensitivities_of_internal_states_are_the_slopes_of_every_schemes_steps() {
+        let on = [0, 1].map(|joint| bristles(Joint::at(joint)));
+        let acrobot = Library::built_in().model("acrobot").unwrap();
+        let model = acrobot.with_effects(on.to_vec()).dynamics();
+        assert_eq!(model.states(), 8);
+        for scheme in SCHEMES {
+            are_slopes(&model, [0.7, -0.4, 1.5, -2.0], 20, scheme);
         }
     }
 
@@ -598,7 +714,7 @@ mod tests {
         *values.last_mut().unwrap() = 4.0;
         let tangent = Tangent::new(&model, &[2], Local::State);
         let mut stepper = TangentStepper::new(&tangent, &values, RK4);
-        stepper.start(&[0.0, 0.5].map(Row::splat));
+        stepper.start(&[0.0, 0.5].map(Row::splat), &InternalStart::default());
         let (time, tau) = ([0.0], [vec![1.0]]);
         let commands = Commands::new(&model, &time, &tau);
         let (held, from) = ([Row::splat(1.0)], Row::splat(0.0));

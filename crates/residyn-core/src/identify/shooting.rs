@@ -1,16 +1,18 @@
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
 use super::balance::{Acting, Balance, Rows};
 use super::normal_equations::WindowTerms;
-use super::pack::Pack;
+use super::pack::{Given, Pack};
 use super::prior::Prior;
 use super::sensitivity::{LANES, Local, Tangent};
 use super::values::{Column, Values};
 use crate::data::{Log, half_width_s};
-use crate::model::{Dynamics, Filter, Model};
-use crate::sim::{Commands, FIT_S, Point, Window, cut, initial_state};
+use crate::model::{Dynamics, Model};
+use crate::sim::{
+    Case, Commands, Course, FIT_S, InternalRates, LoggedMotion, Point, Window, cut, initial_state,
+};
 
 /// Least squares over windows of logs.
 ///
@@ -31,6 +33,8 @@ pub struct Shooting<'l> {
     prior: Prior,
     /// The same logs cut into windows of other lengths, for each length requested so far: shared by all copies.
     cuts: Arc<Mutex<Vec<Cut>>>,
+    /// How the logs move, once internal states have been asked for: shared by all copies.
+    motions: Arc<OnceLock<Vec<LoggedMotion>>>,
 }
 
 /// What the model is compared with, window by window.
@@ -74,6 +78,7 @@ impl<'l> Shooting<'l> {
             measure,
             prior: Prior::default(),
             cuts: Arc::default(),
+            motions: Arc::default(),
         }
     }
 
@@ -147,6 +152,7 @@ impl<'l> Shooting<'l> {
             }
         };
         other.prior = self.prior.clone();
+        other.motions = Arc::clone(&self.motions);
         match self.longest_s == FIT_S {
             true => other,
             false => other.in_steps_of(self.longest_s),
@@ -250,10 +256,10 @@ impl<'l> Shooting<'l> {
         start_states: &[Vec<f64>],
     ) -> Vec<Vec<f64>> {
         let n = dynamics.joints;
-        let of_motion = |pack: &Pack, commands: &[Commands<'_>]| {
+        let of_motion = |pack: &Pack, given: &Given<'_>| {
             let mut all: Vec<(usize, Vec<f64>)> =
                 pack.windows.iter().map(|&w| (w, Vec::new())).collect();
-            pack.roll(dynamics, values, commands, start_states, |row, q| {
+            pack.roll(dynamics, values, given, start_states, |row, q| {
                 for (lane, (window, residuals)) in all.iter_mut().enumerate() {
                     if row < self.windows[*window].rows() {
                         residuals.extend((0..n).map(|j| {
@@ -264,7 +270,7 @@ impl<'l> Shooting<'l> {
             });
             all
         };
-        let per_pack = self.per_pack(dynamics, values, &[], of_motion, |pack, data| {
+        let per_pack = self.per_pack(dynamics, values, None, of_motion, |pack, data| {
             pack.residuals(dynamics, values, data)
         });
         let mut out = vec![Vec::new(); self.windows.len()];
@@ -304,8 +310,8 @@ impl<'l> Shooting<'l> {
         let per_pack = self.per_pack(
             dynamics,
             values,
-            &[],
-            |pack, commands| pack.costs(dynamics, values, commands, start_states, scale),
+            None,
+            |pack, given| pack.costs(dynamics, values, given, start_states, scale),
             |pack, data| pack.costs(dynamics, values, data, scale),
         );
         let mut out = vec![f64::INFINITY; self.windows.len()];
@@ -316,27 +322,37 @@ impl<'l> Shooting<'l> {
         out
     }
 
-    /// The result of each window, computed for all packs at once; with the slopes of the torques by these filters.
+    /// The result of each window, computed for all packs at once; with the slopes of what logs give if there is a tangent.
     fn per_pack<T: Send>(
         &self,
         dynamics: &Dynamics,
         values: &Values,
-        slopes_of: &[Filter],
-        of_motion: impl Fn(&Pack, &[Commands<'_>]) -> Vec<(usize, T)> + Sync,
+        tangent: Option<&Tangent>,
+        of_motion: impl Fn(&Pack, &Given<'_>) -> Vec<(usize, T)> + Sync,
         of_torques: impl Fn(&Balance, (&[Rows], &Acting)) -> Vec<(usize, T)> + Sync,
     ) -> Vec<(usize, T)> {
         match &self.measure {
             Measure::Motion(packs) => {
                 let commands = self.commands(dynamics, values);
+                let courses = self.courses(dynamics, values, tangent, &commands);
+                let given = Given { commands, courses };
                 let packs = packs.par_iter();
-                packs.flat_map(|pack| of_motion(pack, &commands)).collect()
+                packs.flat_map(|pack| of_motion(pack, &given)).collect()
             }
             Measure::Torques { rows, packs } => {
+                let courses = match &dynamics.internal {
+                    Some(_) => {
+                        let commands = self.commands(dynamics, values);
+                        self.courses(dynamics, values, tangent, &commands)
+                    }
+                    None => Vec::new(),
+                };
+                let slopes_of = tangent.map_or(&[][..], |_| &dynamics.filters);
                 let acting = Acting::of(
                     dynamics,
                     values,
                     (self.logs, rows, &self.windows),
-                    slopes_of,
+                    (&courses, slopes_of),
                 );
                 let packs = packs.par_iter();
                 packs
@@ -355,6 +371,33 @@ impl<'l> Shooting<'l> {
         self.logs.iter().enumerate().map(of_log).collect()
     }
 
+    /// The internal states along each log, with their slopes if there is a tangent; none of a model without any.
+    fn courses(
+        &self,
+        dynamics: &Dynamics,
+        values: &Values,
+        tangent: Option<&Tangent>,
+        commands: &[Commands<'_>],
+    ) -> Vec<Course> {
+        let plain = || InternalRates::plain(dynamics);
+        let rates = tangent.map_or_else(plain, |tangent| tangent.internal.clone());
+        let Some(rates) = rates else {
+            return Vec::new();
+        };
+        let of_logs = || self.logs.par_iter().map(LoggedMotion::of).collect();
+        let motions = self.motions.get_or_init(of_logs);
+        let points = (0..self.logs.len()).map(|log| Point::new(dynamics, values.of_log(log)));
+        let points: Vec<Point<'_>> = points.collect();
+        let each = self.logs.iter().zip(&points).zip(motions).zip(commands);
+        let case = |(((log, point), motion), commands)| Case {
+            log,
+            point,
+            motion,
+            commands,
+        };
+        rates.along(&each.map(case).collect::<Vec<_>>())
+    }
+
     /// Cost, gradient and Gauss-Newton matrix of each window.
     pub(super) fn linearise(
         &self,
@@ -367,8 +410,8 @@ impl<'l> Shooting<'l> {
         let mut all = self.per_pack(
             dynamics,
             values,
-            &dynamics.filters,
-            |pack, commands| pack.linearise(tangent, values, commands, start_states, scale),
+            Some(tangent),
+            |pack, given| pack.linearise(tangent, values, given, start_states, scale),
             |pack, data| pack.linearise(tangent, values, data, scale),
         );
         all.sort_by_key(|(window, _)| *window);
@@ -415,6 +458,7 @@ mod tests {
     use crate::identify::sensitivity::{Local, Tangent};
     use crate::identify::{cut, free_parameters};
     use crate::model::{Dynamics, FittedEffect, Library};
+    use crate::sim::bristles;
 
     /// Two seconds of an arbitrary motion and torque at 100 Hz.
     fn log() -> Log {
@@ -427,6 +471,17 @@ mod tests {
             time,
             ..Log::empty(1)
         }
+    }
+
+    /// The same with a second joint that moves like the first.
+    fn two_joints() -> Log {
+        let mut log = log();
+        for channels in [&mut log.q, &mut log.qd, &mut log.tau] {
+            let second = channels[0].iter().map(|x| 0.7 * x + 0.1).collect();
+            channels.push(second);
+        }
+        log.masked.push(Vec::new());
+        log
     }
 
     fn packs(shooting: &Shooting<'_>) -> Arc<Vec<Pack>> {
@@ -483,13 +538,7 @@ mod tests {
         let arm = library.model("acrobot").unwrap();
         let model = arm.with_effects(effects.to_vec());
         let model = model.smoothed_torque_balance().unwrap();
-        let mut log = log();
-        for channels in [&mut log.q, &mut log.qd, &mut log.tau] {
-            let second = channels[0].iter().map(|x| 0.7 * x + 0.1).collect();
-            channels.push(second);
-        }
-        log.masked.push(Vec::new());
-        let logs = [log];
+        let logs = [two_joints()];
         let shooting = Shooting::of_torques(&logs, cut(&logs, 0.5), &[0.5, 0.2], &[0.01; 2]);
         let start_states = shooting.initial_start_states(0);
         let tangent = Tangent::new(&model, &free_parameters(&model), Local::Nothing);
@@ -528,6 +577,37 @@ mod tests {
                         "{local:?}, {k} at {delay}, {lag}: {found} {wanted}"
                     );
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_through_internal_states_are_slopes_of_the_cost() {
+        let library = Library::built_in();
+        let delay = library.effect("actuator_delay").unwrap();
+        let mut delay = FittedEffect::absent(delay, Joint::at(0));
+        delay.values[0].0 = 0.0073;
+        let arm = library.model("acrobot").unwrap();
+        let model = arm.with_effects(vec![bristles(Joint::at(0)), delay]);
+        let (motion, torques) = (model.dynamics(), model.smoothed_torque_balance().unwrap());
+        let mut log = two_joints();
+        log.q[0].iter_mut().for_each(|q| *q *= 20.0);
+        let logs = [log];
+        let windows = || cut(&logs, 0.5);
+        let of_motion = Shooting::new(&logs, windows(), &[0.05; 2]);
+        let of_torques = Shooting::of_torques(&logs, windows(), &[0.5; 2], &[0.01; 2]);
+        for (shooting, model, local) in [
+            (of_motion, motion, Local::State),
+            (of_torques, torques, Local::Nothing),
+        ] {
+            let start_states = shooting.initial_start_states(0);
+            let tangent = Tangent::new(&model, &free_parameters(&model), local);
+            let values = model.values();
+            for (k, found, cost) in gradients(&shooting, &model, &tangent, &values, &start_states) {
+                let wanted = (cost(1e-6) - cost(-1e-6)) / 2e-6;
+                let off = (found - wanted).abs() / wanted.abs().max(1e-3);
+                let name = &model.parameters[k].name;
+                assert!(off < 1e-3, "{local:?}, {name}: {found} {wanted}");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! How fast dry friction brings a joint to rest. In steps that are too long for it, a joint that rests chatters, and
+//! How fast dry friction brings a joint to rest, or swings it about where it sticks. In steps that are too long for it, a joint that rests chatters, and
 //! the cost of a fit jumps from one value of a parameter to the next.
 
 use super::sensitivity::{LANES, Local, Tangent};
@@ -24,8 +24,8 @@ pub fn longest_stable_step(shooting: &Shooting<'_>, dynamics: &Dynamics) -> f64 
     STABLE_SHARE * RK4.most_damping / fastest.fold(0.0, f64::max)
 }
 
-/// The largest sum of the rates (1/s) at which the joints' velocities decay at standstill: no eigenvalue of the friction
-/// exceeds it.
+/// The largest sum of the rates (1/s) at which the joints' velocities decay at standstill, or swing about the internal
+/// states that hold them: no eigenvalue of the friction exceeds it.
 fn fastest_decay<'l>(
     shooting: &Shooting<'l>,
     tangent: &Tangent,
@@ -50,8 +50,17 @@ fn fastest_decay<'l>(
         *input = Row::from_fn(held);
     }
     tape.run();
-    let decay = |joint: usize, lane: usize| -tape.output(n + (2 * n + 1) * joint + n)[lane];
-    let all = |lane: usize| -> f64 { (0..n).map(|joint| decay(joint, lane).max(0.0)).sum() };
+    let decay = |joint: usize, lane: usize| -tape.output(tangent.by_state(joint, n + joint))[lane];
+    let swing = |joint: usize, lane: usize| -> f64 {
+        let by = |slope: usize, state: usize| tape.output(tangent.by_state(slope, state))[lane];
+        let internal = layout.internal().map(|state| {
+            let held = by(joint, state) * by(state - n, n + joint);
+            (-held).max(0.0)
+        });
+        internal.sum::<f64>().sqrt()
+    };
+    let of_joint = |joint: usize, lane: usize| decay(joint, lane).max(0.0) + swing(joint, lane);
+    let all = |lane: usize| -> f64 { (0..n).map(|joint| of_joint(joint, lane)).sum() };
     (0..LANES).map(all).fold(0.0, f64::max)
 }
 

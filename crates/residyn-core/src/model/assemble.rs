@@ -4,6 +4,7 @@ use super::dynamics::{Dynamics, Parameter, PerLogValue};
 use super::effect::{Effect, Entry, PLACE, RATIO};
 use super::filter::Filter;
 use super::fitted::FittedEffect;
+use super::internal_state::{InternalStates, mean_rates};
 use super::reader::Located;
 use super::system::{Model, Motion};
 use crate::data::{Joint, Quantity};
@@ -16,17 +17,84 @@ impl Model {
     /// follow in their order, and forces are added last. `load` is the torque before forces are added.
     pub fn dynamics(&self) -> Dynamics {
         let sign = self.sign();
-        let mut assembly = Assembly::new(self, &self.effects, &sign);
+        let (mut assembly, reading) = self.driven(&sign);
+        let accelerations = assembly.accelerations();
+        let outputs = [&assembly.qd, &accelerations, &assembly.rates].map(Vec::as_slice);
+        let program = self.of_a_step(assembly.graph.finish(&outputs.concat()));
+        Dynamics {
+            reading: reading.map(|reading| self.of_a_step(reading)),
+            ..self.compiled(program)
+        }
+    }
+
+    /// All torques and forces that act over a step, and what the sensors show.
+    fn driven<'a>(&'a self, sign: &'a [SignForm]) -> (Assembly<'a>, Option<Program>) {
+        let mut assembly = Assembly::new(self, &self.effects, sign);
+        assembly.begin_step();
         assembly.apply_drive();
         let reading = assembly.reading();
         assembly.apply_sensors();
         assembly.apply_torque_effects();
         assembly.apply_forces();
-        let accelerations = assembly.accelerations();
-        let outputs = [assembly.qd, accelerations].concat();
-        Dynamics {
-            reading,
-            ..self.compiled(assembly.graph.finish(&outputs))
+        (assembly, reading)
+    }
+
+    /// The states that the effects have of their own.
+    fn internal_states(&self) -> Option<InternalStates> {
+        let names = self.state_names();
+        if names.is_empty() {
+            return None;
+        }
+        let sign = self.sign();
+        let (Assembly { graph, rates, .. }, _) = self.driven(&sign);
+        let rates = self.of_a_step(graph.finish(&rates));
+        let programs = [rates, self.internal_starts()];
+        Some(InternalStates::new(
+            names,
+            programs,
+            self.layout(),
+            &self.filters(),
+        ))
+    }
+
+    /// Their values before a log begins, from all parameters.
+    fn internal_starts(&self) -> Program {
+        let mut graph = Graph::new();
+        let parameters = self.all_parameters();
+        let nodes: Vec<Node> = parameters.iter().map(|p| graph.input(&p.name)).collect();
+        let mut starts = Vec::new();
+        for (FittedEffect { effect, .. }, place) in self.placed() {
+            let mut scope = Scope::new(SignForm::Exact);
+            for (name, node) in effect.names().zip(&nodes[place]) {
+                scope.bind(name, *node);
+            }
+            let states = effect.states.iter();
+            starts.extend(states.map(|state| state.start(&mut graph, &scope)));
+        }
+        graph.finish(&starts)
+    }
+
+    /// The names of the effects' own states.
+    fn state_names(&self) -> Vec<String> {
+        if self.layout().internal().is_empty() {
+            return Vec::new();
+        }
+        let parameters = self.all_parameters();
+        let mut names: Vec<String> = Vec::new();
+        for effect in &self.effects {
+            let taken = parameters.iter().map(|p| p.name.as_str());
+            let taken = taken.chain(names.iter().map(String::as_str));
+            let taken: Vec<&str> = self.own_names().chain(taken).collect();
+            names.extend(effect.state_names(&taken));
+        }
+        names
+    }
+
+    /// The program of a step, with what describes the step before the parameters.
+    fn of_a_step(&self, program: Program) -> Program {
+        match self.layout().internal().is_empty() {
+            true => program,
+            false => self.with_parameters_last(&program),
         }
     }
 
@@ -38,6 +106,7 @@ impl Model {
             measured: self.measured_names().map(str::to_owned).collect(),
             parameters: self.all_parameters(),
             program,
+            internal: self.internal_states(),
             filters: self.filters(),
             reading: None,
             own: self.per_log_values(),
@@ -99,9 +168,20 @@ impl Model {
         };
         let differences: Vec<Node> = (0..self.joints).map(difference).collect();
         let program = graph.finish(&differences);
-        let parameters = self.values().len();
-        let moving = self.layout().parameters();
-        Some(self.compiled(with_parameters_last(&program, moving, parameters)))
+        Some(self.compiled(self.with_parameters_last(&program)))
+    }
+
+    /// The same program, whose first inputs end with the time, with its parameters as the last.
+    fn with_parameters_last(&self, program: &Program) -> Program {
+        let (moving, rest) = program.inputs().split_at(self.layout().time() + 1);
+        let (parameters, more) = rest.split_at(self.values().len());
+        let mut graph = Graph::new();
+        let mut inputs = |names: &[String]| -> Vec<Node> {
+            names.iter().map(|name| graph.input(name)).collect()
+        };
+        let (moving, more, parameters) = (inputs(moving), inputs(more), inputs(parameters));
+        let outputs = graph.append(program, &[moving, parameters, more].concat());
+        graph.finish(&outputs)
     }
 
     /// The mass matrix, row by row, and the bias as a program with the inputs of [`Dynamics`]; `None` for a model that
@@ -167,15 +247,34 @@ struct Coupling {
     inertia: Node,
 }
 
+/// An effect with the nodes of its parameters and the places of its states among all internal ones.
+struct Placed<'a> {
+    effect: &'a FittedEffect,
+    parameters: Vec<Node>,
+    states: Range<usize>,
+}
+
+/// A step that begins: the internal states at its start, and its length.
+struct Step {
+    starts: Vec<Node>,
+    length: Node,
+}
+
 /// The program under construction.
 struct Assembly<'a> {
     system: &'a Model,
-    effects: Vec<(&'a FittedEffect, Vec<Node>)>,
+    effects: Vec<Placed<'a>>,
     sign: &'a [SignForm],
     graph: Graph,
     /// The angle of the rig, once sensors are accounted for.
     q: Vec<Node>,
     qd: Vec<Node>,
+    /// The internal states of all effects, in their order.
+    internal: Vec<Node>,
+    /// None where the internal states are given.
+    step: Option<Step>,
+    /// The mean rates of the internal states over the step; zero until their effect is applied.
+    rates: Vec<Node>,
     /// The torque after what has been applied so far; the command before the drive.
     tau: Vec<Node>,
     /// The further measured columns of the model, in its order.
@@ -194,8 +293,12 @@ impl<'a> Assembly<'a> {
                 .map(|joint| graph.input(&joint.name(stem)))
                 .collect()
         };
-        let stems = ["q", "qd", system.driven_by().key()];
-        let [q, qd, tau] = stems.map(&mut numbered);
+        let [q, qd] = ["q", "qd"].map(&mut numbered);
+        let names = system.state_names().into_iter();
+        let internal = names.map(|name| graph.input(&name)).collect();
+        let tau = system.driven_by().key();
+        let tau = Joint::all(system.joints).map(|joint| graph.input(&joint.name(tau)));
+        let tau = tau.collect();
         let measured = system.measured_names().map(|name| graph.input(name));
         let measured = measured.collect();
         let time = graph.input("t");
@@ -210,22 +313,47 @@ impl<'a> Assembly<'a> {
             .map(|p| graph.input(&p.name))
             .collect::<Vec<_>>()
             .into_iter();
-        let with_nodes = (effects.iter())
-            .map(|effect| (effect, nodes.by_ref().take(effect.values.len()).collect()))
-            .collect();
+        let mut states = 0;
+        let mut place = |effect: &'a FittedEffect| {
+            let first = states;
+            states += effect.effect.states.len();
+            Placed {
+                effect,
+                parameters: nodes.by_ref().take(effect.values.len()).collect(),
+                states: first..states,
+            }
+        };
+        let effects = effects.iter().map(&mut place).collect();
         Self {
             system,
-            effects: with_nodes,
+            effects,
             sign,
             graph,
             q,
             qd,
+            internal,
+            step: None,
+            rates: Vec::new(),
             tau,
             measured,
             time,
             declared,
             directions: Vec::new(),
         }
+    }
+
+    /// Give the internal states' values at the start of a step, and its length, as further inputs.
+    fn begin_step(&mut self) {
+        let names = self.system.state_names();
+        if names.is_empty() {
+            return;
+        }
+        let mut start = |name: &String| self.graph.input(&format!("{name}_before"));
+        self.step = Some(Step {
+            starts: names.iter().map(&mut start).collect(),
+            length: self.graph.input("step_s"),
+        });
+        self.rates = vec![self.graph.constant(0.0); names.len()];
     }
 
     /// New inputs, one per joint.
@@ -282,12 +410,25 @@ impl<'a> Assembly<'a> {
 
     fn apply_forces(&mut self) {
         // All forces see the torque as it was before any of them.
-        let forces: Vec<(Joint, Node)> = self
+        let forces: Vec<(Joint, Node, bool)> = self
             .entries(|effect| matches!(effect.entry, Entry::Force(_)))
             .into_iter()
-            .map(|(index, joint, formula)| (joint, self.effect_node(index, formula)))
+            .map(|(index, joint, formula)| {
+                let is_friction = self.effects[index].effect.effect.is_friction();
+                (joint, self.effect_node(index, formula), is_friction)
+            })
             .collect();
-        for (joint, force) in forces {
+        let shares: Vec<(Joint, Node)> = (self
+            .entries(|effect| matches!(effect.entry, Entry::Friction(_)))
+            .into_iter())
+        .map(|(index, joint, formula)| (joint, self.effect_node(index, formula)))
+        .collect();
+        for (joint, mut force, is_friction) in forces {
+            if is_friction {
+                for (_, share) in shares.iter().filter(|(own, _)| *own == joint) {
+                    force = self.graph.mul(force, *share);
+                }
+            }
             self.tau[joint] = self.graph.add(self.tau[joint], force);
         }
         for coupling in self.couplings() {
@@ -313,21 +454,24 @@ impl<'a> Assembly<'a> {
 
     /// A parameter that the effect needs by name.
     fn parameter(&self, index: usize, name: &str) -> Node {
-        let (effect, nodes) = &self.effects[index];
+        let Placed {
+            effect, parameters, ..
+        } = &self.effects[index];
         let k = effect.effect.names().position(|own| own == name);
-        nodes[k.expect("checked when the file was read")]
+        parameters[k.expect("checked when the file was read")]
     }
 
     /// The effects on sums of two joints.
     fn couplings(&mut self) -> Vec<Coupling> {
         let indices: Vec<usize> = (0..self.effects.len())
-            .filter(|k| self.effects[*k].0.effect.is_coupling())
+            .filter(|k| self.effects[*k].effect.effect.is_coupling())
             .collect();
         indices.into_iter().map(|k| self.coupling(k)).collect()
     }
 
     fn coupling(&mut self, index: usize) -> Coupling {
-        let (effect, nodes) = (self.effects[index].0, self.effects[index].1.clone());
+        let effect = self.effects[index].effect;
+        let parameters = self.effects[index].parameters.clone();
         let [joint, next] = [effect.joint, effect.joint.next()];
         let ratio = self.parameter(index, RATIO);
         let mut sum = |of: [Node; 2]| {
@@ -345,7 +489,7 @@ impl<'a> Assembly<'a> {
         let measured: Vec<Node> = (effect.effect.measured())
             .filter_map(|name| self.measured_as(name))
             .collect();
-        let inputs = [&[q, qd, rest, self.time], &*measured, nodes.as_slice()].concat();
+        let inputs = [&[q, qd, rest, self.time], &*measured, &*parameters].concat();
         let program = program.expect("the effect is a coupling");
         let out = self.graph.append(&program, &inputs);
         let one = self.graph.constant(1.0);
@@ -359,17 +503,34 @@ impl<'a> Assembly<'a> {
     /// The effects that enter in one particular way: index, joint and formula.
     fn entries(&self, is_wanted: impl Fn(&Effect) -> bool) -> Vec<(usize, Joint, &'a Formula)> {
         let effects = self.effects.iter().enumerate();
-        let wanted = effects.filter(|(_, (effect, _))| is_wanted(&effect.effect));
+        let wanted = effects.filter(|(_, placed)| is_wanted(&placed.effect.effect));
         wanted
-            .filter_map(|(index, (effect, _))| {
+            .filter_map(|(index, Placed { effect, .. })| {
                 Some((index, effect.joint, effect.effect.entry.formula()?))
             })
             .collect()
     }
 
-    /// An effect's formula in the variables of its joint.
+    /// An effect's formula in the variables of its joint. Its states move under the same torque.
     fn effect_node(&mut self, index: usize, formula: &Formula) -> Node {
-        let (effect, nodes) = &self.effects[index];
+        let scope = self.effect_scope(index);
+        let Placed { effect, states, .. } = &self.effects[index];
+        if let Some(step) = self.step.as_ref().filter(|_| !states.is_empty()) {
+            let (starts, scope) = (&step.starts[states.clone()], scope.clone());
+            let of_effect = (starts, step.length);
+            let rates = mean_rates(&effect.effect.states, &mut self.graph, scope, of_effect);
+            self.rates[states.clone()].copy_from_slice(&rates);
+        }
+        lower(&scope, &mut self.graph, formula)
+    }
+
+    /// The names that an effect's formulas may mention.
+    fn effect_scope(&self, index: usize) -> Scope {
+        let Placed {
+            effect,
+            parameters,
+            states,
+        } = &self.effects[index];
         let joint = effect.joint;
         let mut scope = Scope::new(self.sign[joint]);
         scope.bind("q", self.q[joint]);
@@ -378,10 +539,14 @@ impl<'a> Assembly<'a> {
         scope.bind("load", self.tau[joint]);
         self.bind_given(&mut scope);
         self.give_directions(&mut scope);
-        for (parameter, node) in effect.effect.parameters.iter().zip(nodes) {
-            scope.bind(&parameter.name, *node);
+        for (name, node) in effect.effect.names().zip(parameters) {
+            scope.bind(name, *node);
         }
-        lower(&scope, &mut self.graph, formula)
+        let states = &self.internal[states.clone()];
+        for (state, node) in effect.effect.states.iter().zip(states) {
+            scope.bind(&state.name, *node);
+        }
+        scope
     }
 
     fn accelerations(&mut self) -> Vec<Node> {
@@ -521,7 +686,7 @@ impl<'a> Assembly<'a> {
     /// Shifted parameters take the place of the declared ones.
     fn bind_shifted(&mut self, scope: &mut Scope) {
         for (index, _, formula) in self.entries(|e| matches!(e.entry, Entry::Shift(..))) {
-            if let Some(k) = self.effects[index].0.shifted() {
+            if let Some(k) = self.effects[index].effect.shifted() {
                 let shift = self.effect_node(index, formula);
                 let shifted = self.graph.add(self.declared[k], shift);
                 scope.bind(&self.system.parameters[k].name, shifted);
@@ -551,16 +716,4 @@ pub(super) fn lower(scope: &Scope, graph: &mut Graph, formula: &Formula) -> Node
     scope
         .lower(graph, formula)
         .expect("formulas were checked when the file was read")
-}
-
-/// The same program, whose first inputs are the `moving` ones, with its parameters as the last.
-fn with_parameters_last(program: &Program, moving: usize, parameters: usize) -> Program {
-    let (moving, rest) = program.inputs().split_at(moving);
-    let (parameters, more) = rest.split_at(parameters);
-    let mut graph = Graph::new();
-    let mut inputs =
-        |names: &[String]| -> Vec<Node> { names.iter().map(|name| graph.input(name)).collect() };
-    let (moving, more, parameters) = (inputs(moving), inputs(more), inputs(parameters));
-    let outputs = graph.append(program, &[moving, parameters, more].concat());
-    graph.finish(&outputs)
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::configuration::{Configuration, Differing, InLog};
 use super::filter::Filter;
 use super::input_layout::InputLayout;
+use super::internal_state::InternalStates;
 use crate::data::{Joint, Log, Quantity};
 use crate::expr::Program;
 
@@ -68,9 +69,11 @@ impl PerLogValue {
 
 /// A compiled model: first-order differential equations as one program, with the values of its parameters.
 ///
-/// Inputs of the program, in this order: `q1..qn`, `qd1..qdn` (rad or m, and per second), `tau1..taun`
-/// (N m or N) or the commands of the drives `cmd1..cmdn`, the further measured columns in the order of `measured`, `t` (s),
-/// then the parameters in the order of `parameters`. Outputs: `dq/dt` (n values), then `dqd/dt` (n values). Torques or commands are those that act, after `filters`.
+/// Inputs of the program, in this order: `q1..qn`, `qd1..qdn` (rad or m, and per second), the internal states of effects,
+/// `tau1..taun` (N m or N) or the commands of the drives `cmd1..cmdn`, the further measured columns in the order of
+/// `measured`, `t` (s), then the parameters in the order of `parameters`; before these, if there are internal states, their
+/// values at the start of the step and its length (s). Outputs: `dq/dt` (n values), `dqd/dt` (n values), then the mean
+/// rates of the internal states over the step. Torques or commands are those that act, after `filters`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamics {
     /// Name of the system, for messages and files.
@@ -81,6 +84,8 @@ pub struct Dynamics {
     pub measured: Vec<String>,
     pub parameters: Vec<Parameter>,
     pub program: Program,
+    /// The states that its effects have of their own, if they have any.
+    pub internal: Option<InternalStates>,
     /// Filters of the commanded torques, see [`Commands`](crate::sim::Commands).
     pub filters: Vec<Filter>,
     /// The measured angles, from the same inputs (n outputs), unless they equal the true ones. The torques are those that
@@ -158,11 +163,20 @@ impl Dynamics {
 
     /// Places of the program's inputs.
     pub fn layout(&self) -> InputLayout {
-        InputLayout::of(self.joints).with_measured(self.measured.len())
+        let internal = self.internal.as_ref().map_or(0, |own| own.names.len());
+        InputLayout::of(self.joints)
+            .with_internal(internal)
+            .with_measured(self.measured.len())
     }
 
-    /// Number of states, 2n.
+    /// Number of states: 2n, and the internal ones.
     pub fn states(&self) -> usize {
-        2 * self.joints
+        self.layout().states().len()
+    }
+
+    /// The internal states before a log begins, at these values of the parameters.
+    pub fn internal_starts(&self, values: &[f64]) -> Vec<f64> {
+        let starts = self.internal.as_ref().map(|own| own.starts.eval(values));
+        starts.unwrap_or_default()
     }
 }

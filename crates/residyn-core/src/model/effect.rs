@@ -3,6 +3,7 @@ use std::collections::BTreeSet;
 use super::assemble::lower;
 use super::error::ModelError;
 use super::filter::CommandFilter;
+use super::internal_state::InternalState;
 use crate::data::{NOMINAL, is_measured};
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm, suggestion};
 
@@ -42,6 +43,8 @@ pub struct Effect {
     pub about: String,
     pub entry: Entry,
     pub parameters: Vec<EffectParameter>,
+    /// The states that it has of its own, which its formula and their rates may mention.
+    pub states: Vec<InternalState>,
     /// A condition on the parameters, which holds if it is positive.
     pub valid_if: Option<Formula>,
     /// Simpler effects that are special cases of this one.
@@ -103,6 +106,8 @@ pub enum Entry {
     Angle(Formula),
     /// Added to the joint's diagonal entry of the mass matrix.
     Inertia(Formula),
+    /// Multiplies the friction of its joint: the forces of effects that its velocity changes.
+    Friction(Formula),
     /// Added to the declared parameter of this index.
     Shift(usize, Formula),
     /// A filter of the commanded torque, applied before all other effects on it.
@@ -148,6 +153,7 @@ impl Entry {
             | Self::Torque(f)
             | Self::Angle(f)
             | Self::Inertia(f)
+            | Self::Friction(f)
             | Self::Shift(_, f)
             | Self::Reading(f)
             | Self::Coupling(f)
@@ -161,15 +167,12 @@ impl Entry {
         self.formula_or_filter().ok()
     }
 
-    /// Whether the effect is invisible on a joint without torque.
-    pub fn needs_torque(&self) -> bool {
-        match self.formula_or_filter() {
-            Ok(formula) => {
-                let mut names = formula.names().into_iter();
-                names.any(|name| ["tau", "load"].contains(&name))
-            }
-            Err(_) => true,
-        }
+    /// Whether the formula may mention states of the effect.
+    pub(super) fn may_have_states(&self) -> bool {
+        matches!(
+            self,
+            Self::Force(_) | Self::Torque(_) | Self::Friction(_) | Self::Reading(_)
+        )
     }
 }
 
@@ -182,6 +185,21 @@ pub enum Measure {
     Speed,
     /// The highest torque of the joint in the logs.
     Torque,
+    /// The longest log.
+    Duration,
+}
+
+/// How far the logs of a joint reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Logged {
+    /// The speed over which dry friction reverses, rad/s or m/s.
+    pub reversal: f64,
+    /// The highest speed, rad/s or m/s.
+    pub top_speed: f64,
+    /// The highest torque, N m or N.
+    pub top_torque: f64,
+    /// The length of the longest log, s.
+    pub duration_s: f64,
 }
 
 /// A parameter of an effect.
@@ -212,16 +230,33 @@ impl Effect {
             .map(|parameter| parameter.name.as_str())
     }
 
-    /// The further measured columns that its formula mentions, in the order of their names.
+    /// Every name that its formula and those of its states mention, in order.
+    pub fn mentions(&self) -> BTreeSet<&str> {
+        let of_states = self.states.iter().flat_map(InternalState::formulas);
+        let formulas = self.entry.formula().into_iter().chain(of_states);
+        formulas.flat_map(Formula::names).collect()
+    }
+
+    /// The further measured columns that it reads, in the order of their names.
     pub fn measured(&self) -> impl Iterator<Item = &str> {
-        let names = self.entry.formula().map(Formula::names);
-        let names: BTreeSet<&str> = names.into_iter().flatten().collect();
-        names.into_iter().filter(|name| is_measured(name))
+        let names = self.mentions().into_iter();
+        names.filter(|name| is_measured(name))
+    }
+
+    /// Whether the effect is invisible on a joint without torque.
+    pub fn needs_torque(&self) -> bool {
+        let names = self.mentions();
+        self.is_filter() || ["tau", "load"].iter().any(|name| names.contains(name))
     }
 
     /// Whether one of two effects is listed as easily confused with the other.
     pub fn is_confused_with(&self, other: &Self) -> bool {
         self.confused_with.contains(&other.name) || other.confused_with.contains(&self.name)
+    }
+
+    /// Whether the effect is a force that the velocity of its joint changes.
+    pub fn is_friction(&self) -> bool {
+        matches!(self.entry, Entry::Force(_)) && self.mentions().contains("qd")
     }
 
     /// Whether the effect delays commands or low-passes them.
@@ -265,7 +300,7 @@ impl Effect {
             Entry::Torque(formula) => (formula, Some("tau")),
             _ => return None,
         };
-        if self.measured().next().is_some() {
+        if self.measured().next().is_some() || !self.states.is_empty() {
             return None;
         }
         let names = formula.names();
@@ -303,19 +338,19 @@ impl Effect {
         })
     }
 
-    /// The same effect with bounds and starting values in the parameters' own units, for a joint with this highest speed
-    /// and torque in the logs, whose dry friction reverses over the speed `reversal`. Dry friction has no other shape
-    /// within its reversal: no speed at which it changes is lower.
+    /// The same effect with bounds and starting values in the parameters' own units, for a joint in its logs. Dry friction
+    /// has no other shape within its reversal: no speed at which it changes is lower.
     #[must_use]
-    pub fn measured_by(&self, reversal: f64, top_speed: f64, top_torque: f64) -> Self {
+    pub fn measured_by(&self, logged: &Logged) -> Self {
         let is_dry = (self.entry.formula()).is_some_and(|formula| formula.calls("sign"));
-        let slowest = if is_dry { reversal } else { 0.0 };
+        let slowest = if is_dry { logged.reversal } else { 0.0 };
         let mut effect = self.clone();
         for parameter in &mut effect.parameters {
             let (least, unit) = match std::mem::replace(&mut parameter.measure, Measure::One) {
                 Measure::One => (None, 1.0),
-                Measure::Speed => (Some(slowest), top_speed),
-                Measure::Torque => (None, top_torque),
+                Measure::Speed => (Some(slowest), logged.top_speed),
+                Measure::Torque => (None, logged.top_torque),
+                Measure::Duration => (None, logged.duration_s),
             };
             let multiples = parameter.bounds.iter_mut().chain(&mut parameter.starts);
             multiples.for_each(|value| *value *= unit);
@@ -344,14 +379,16 @@ impl Effect {
     }
 
     /// The value of a formula, where `of_joint` gives its joint's `q`, `qd`, `tau` and so on; measured columns are at
-    /// [`NOMINAL`].
+    /// [`NOMINAL`], internal states at zero.
     fn evaluate(&self, formula: &Formula, values: &[f64], of_joint: impl Fn(&str) -> f64) -> f64 {
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
         let of_joint = EFFECT_NAMES.map(|name| (name, of_joint(name)));
         let own = self.names().zip(values.iter().copied());
         let measured = self.measured().map(|name| (name, NOMINAL));
-        for (name, value) in of_joint.into_iter().chain(measured).chain(own) {
+        let states = self.states.iter().map(|state| (state.name.as_str(), 0.0));
+        let all = of_joint.into_iter().chain(measured).chain(states);
+        for (name, value) in all.chain(own) {
             let node = graph.constant(value);
             scope.bind(name, node);
         }
@@ -430,7 +467,7 @@ impl Effect {
     pub fn is_mirror_symmetric(&self) -> bool {
         let (formula, sign) = match &self.entry {
             Entry::Force(formula) | Entry::Torque(formula) => (formula, -1.0),
-            Entry::Inertia(formula) => (formula, 1.0),
+            Entry::Inertia(formula) | Entry::Friction(formula) => (formula, 1.0),
             Entry::Command(_) => return true,
             _ => return false,
         };
@@ -475,6 +512,7 @@ fn grows(torques: &[f64]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::Logged;
     use crate::model::Library;
 
     /// The variable of a built-in effect, and its force there with the derivatives with respect to the parameters.
@@ -559,7 +597,12 @@ mod tests {
         let library = Library::built_in();
         let speed = |effect: &str, parameter: &str, reversal: f64| {
             let effect = library.effect(effect).unwrap();
-            let measured = effect.measured_by(reversal, 10.0, 1.0);
+            let measured = effect.measured_by(&Logged {
+                reversal,
+                top_speed: 10.0,
+                top_torque: 1.0,
+                duration_s: 20.0,
+            });
             let mut parameters = measured.parameters.into_iter();
             let speed = parameters.find(|own| own.name == parameter).unwrap();
             (speed.bounds, speed.starts)

@@ -3,16 +3,17 @@
 use std::path::Path;
 use std::str::FromStr;
 
-use super::effect::{Effect, EffectParameter, Entry, Measure};
+use super::effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
+use super::internal_state::InternalState;
 use super::reader::{Document, FileError, Located, Section};
 use super::sections;
-use super::tables::{EffectFile, EffectParameterTable, EffectTable};
+use super::tables::{EffectFile, EffectParameterTable, EffectTable, InternalStateTable};
 use super::values::Named;
 use crate::data::is_measured;
-use crate::expr::Formula;
+use crate::expr::{Formula, parse};
 
 const ONE_WAY: &str =
-    "one of force, torque, angle, inertia, command, reading, coupling and payload";
+    "one of force, torque, angle, inertia, friction, command, reading, coupling and payload";
 
 impl Effect {
     /// The effect in `text`; `path` is for messages.
@@ -23,13 +24,16 @@ impl Effect {
         let document = Document::new(path, text);
         let EffectFile {
             effect: mut table,
+            states: Named(states),
             parameters: Named(parameters),
             section,
         } = EffectFile::of(document.parse()?)?;
         section.read::<Section<'_>>("parameters")?;
         let parameters = parameters.into_iter().map(parameter);
         let parameters = parameters.collect::<Result<Vec<_>, _>>()?;
-        let entry = entry(&mut table, &parameters)?;
+        let names_of_states: Vec<&str> = states.iter().map(|(name, _)| name.as_str()).collect();
+        let entry = entry(&mut table, &parameters, &names_of_states)?;
+        let states = internal_states(states, &entry, &parameters)?;
         if let Some(condition) = &table.valid_if {
             (table.section).check_names("valid_if", &condition.value, names(&parameters))?;
         }
@@ -43,6 +47,7 @@ impl Effect {
             about: table.about,
             entry,
             parameters,
+            states,
             contains: table.contains,
             confused_with: table.confused_with,
             shown_by: table.shown_by.unwrap_or_default(),
@@ -64,13 +69,18 @@ impl FromStr for Effect {
 }
 
 /// The one way in which the effect enters the equations; its formula is taken from the table.
-fn entry(table: &mut EffectTable<'_>, parameters: &[EffectParameter]) -> Result<Entry, FileError> {
+fn entry(
+    table: &mut EffectTable<'_>,
+    parameters: &[EffectParameter],
+    states: &[&str],
+) -> Result<Entry, FileError> {
     type Make = fn(Formula) -> Entry;
-    let formulas: [(&str, Option<Located<Formula>>, Make); 7] = [
+    let formulas: [(&str, Option<Located<Formula>>, Make); 8] = [
         ("force", table.force.take(), Entry::Force),
         ("torque", table.torque.take(), Entry::Torque),
         ("angle", table.angle.take(), Entry::Angle),
         ("inertia", table.inertia.take(), Entry::Inertia),
+        ("friction", table.friction.take(), Entry::Friction),
         ("reading", table.reading.take(), Entry::Reading),
         ("coupling", table.coupling.take(), Entry::Coupling),
         ("payload", table.payload.take(), Entry::Payload),
@@ -90,7 +100,8 @@ fn entry(table: &mut EffectTable<'_>, parameters: &[EffectParameter]) -> Result<
     if let Some(formula) = entry.formula() {
         let measured = formula.names().into_iter();
         let measured = measured.filter(|name| is_measured(name) && entry.may_be_measured());
-        let known = entry.names().iter().copied().chain(names(parameters));
+        let known = entry.names().iter().chain(states).copied();
+        let known = known.chain(names(parameters));
         section.check_names(key, formula, known.chain(measured))?;
     } else if !is_one_time(parameters) {
         let message =
@@ -102,6 +113,53 @@ fn entry(table: &mut EffectTable<'_>, parameters: &[EffectParameter]) -> Result<
         None => Ok(entry),
         Some(name) => Err(section.error_at(key, format!("`{key}` needs a parameter `{name}`"))),
     }
+}
+
+/// The effect's own states, each with formulas in names that exist.
+fn internal_states(
+    tables: Vec<(String, InternalStateTable<'_>)>,
+    entry: &Entry,
+    parameters: &[EffectParameter],
+) -> Result<Vec<InternalState>, FileError> {
+    let mut known: Vec<String> = EFFECT_NAMES.map(str::to_owned).to_vec();
+    known.extend(names(parameters).map(str::to_owned));
+    for (name, table) in &tables {
+        if tables.len() > 2 {
+            return Err(table.section.error("an effect has at most two states"));
+        }
+        if !entry.may_have_states() {
+            let message = "only an effect with force, torque, friction or reading has states";
+            return Err(table.section.error(message));
+        }
+        if !parse(name).is_ok_and(|formula| formula.is_name(name)) || known.contains(name) {
+            let message = format!("a state cannot have the name `{name}`; choose another");
+            return Err(table.section.error(message));
+        }
+        known.push(name.clone());
+    }
+    let state = |(name, table): (String, InternalStateTable<'_>)| {
+        let check = |key: &str, formula: &Formula| {
+            let measured = formula.names().into_iter().filter(|name| is_measured(name));
+            let names = known.iter().map(String::as_str).chain(measured);
+            table.section.check_names(key, formula, names)
+        };
+        check("rate", &table.rate.value)?;
+        let ends = table.within.iter().flatten();
+        ends.clone()
+            .try_for_each(|end| check("within", &end.value))?;
+        if let Some(start) = &table.start {
+            (table.section).check_names("start", &start.value, names(parameters))?;
+        }
+        Ok(InternalState {
+            name,
+            unit: table.unit,
+            about: table.about.unwrap_or_default(),
+            rate: table.rate.value,
+            start: table.start.map(|start| start.value),
+            within: table.within.map(|ends| ends.map(|end| end.value)),
+        })
+    };
+    tables.into_iter().map(state).collect()
 }
 
 fn names(parameters: &[EffectParameter]) -> impl Iterator<Item = &str> {

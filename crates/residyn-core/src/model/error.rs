@@ -50,6 +50,17 @@ pub enum ModelError {
         column: String,
         what: &'static str,
     },
+    /// Something that has no internal states runs a model with an effect that has some.
+    #[error(
+        "{effect} of {model} has states of its own, which {what} cannot have yet; put an effect without states in its place: \
+         `residyn list effects` shows them"
+    )]
+    HasInternalStates {
+        model: String,
+        /// `presliding on joint 1`
+        effect: String,
+        what: &'static str,
+    },
     /// The model already has this effect, or one that excludes it, on the joint.
     #[error("`{effect}` already acts on joint {joint}")]
     Twice { effect: String, joint: Joint },

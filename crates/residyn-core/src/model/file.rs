@@ -115,7 +115,7 @@ impl Model {
     /// Parameters and intermediates must not take the names of states, torques, measured columns or each other.
     fn check_names(&self, document: &Document) -> Result<(), FileError> {
         let mut taken: Vec<String> = self.input_names();
-        taken.truncate(self.layout().parameters());
+        taken.truncate(taken.len() - self.parameters.len());
         taken.extend(Joint::all(self.joints).map(|joint| joint.name(Quantity::Command.key())));
         let parameters = self.parameters.iter().map(|parameter| &parameter.name);
         let parameters = parameters.zip(self.places.parameters.iter().copied());
@@ -141,7 +141,7 @@ impl Model {
         let mut names = self.input_names();
         if matches!(self.equations.motion, Motion::Tree(_)) {
             // The inertia of a body does not change as it moves.
-            names.drain(..self.layout().parameters());
+            names.drain(..names.len() - self.parameters.len());
         }
         let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
         let mut lower = |scope: &Scope, formula: &Located<Formula>| {

@@ -101,15 +101,33 @@ impl FittedEffect {
         self.joint == other.joint && self.effect.contains.contains(&other.effect.name)
     }
 
-    /// The effect's formula in the names of its joint, which is driven by torques or commands: `-F_c1 * sign(qd1)`.
+    /// The effect's formula in the names of its joint, which is driven by torques or commands: `-F_c1 * sign(qd1)`; then how
+    /// its states move: `-k1 * z1, dz1/dt = qd1, -e1 <= z1 <= e1`.
     pub fn expression(&self, names: &[String], driven_by: Quantity) -> String {
         match self.program(names) {
-            Ok(program) => program.formula(0),
+            Ok(program) => {
+                let state = |(name, [rate, low, high]): (String, [usize; 3])| {
+                    let [rate, low, high] = [rate, low, high].map(|k| program.formula(k));
+                    let within = format!(", {low} <= {name} <= {high}");
+                    let within = if low == high { String::new() } else { within };
+                    format!(", d{name}/dt = {rate}{within}")
+                };
+                let states = self.printed_states().map(state);
+                program.formula(0) + &states.collect::<String>()
+            }
             Err(filter) => filter.expression(&self.joint.name(driven_by.key()), &names[0]),
         }
     }
 
-    /// The effect's formula as a program, or the filter if it is one.
+    /// The name of each state on its joint, with the outputs of its rate and of the ends of its range in the effect's
+    /// program.
+    pub(super) fn printed_states(&self) -> impl Iterator<Item = (String, [usize; 3])> {
+        let states = self.effect.states.iter().enumerate();
+        states.map(|(k, state)| (self.joint.name(&state.name), [1, 2, 3].map(|of| 3 * k + of)))
+    }
+
+    /// The effect's formula as a program, followed by the rate of each of its states and the ends of the state's range,
+    /// which are both zero if it has none; or the filter if it is one.
     pub(super) fn program(&self, names: &[String]) -> Result<Program, CommandFilter> {
         let formula = self.effect.entry.formula_or_filter()?;
         let mut graph = Graph::new();
@@ -121,6 +139,10 @@ impl FittedEffect {
         for name in self.effect.measured() {
             let node = graph.input(name);
             scope.bind(name, node);
+        }
+        for state in &self.effect.states {
+            let node = graph.input(&self.joint.name(&state.name));
+            scope.bind(&state.name, node);
         }
         for stem in self.effect.entry.names() {
             let node = match (*stem, scope.get(RATIO)) {
@@ -135,27 +157,39 @@ impl FittedEffect {
             };
             scope.bind(stem, node);
         }
-        let node = lower(&scope, &mut graph, formula);
-        Ok(graph.finish(&[node]))
+        let mut outputs = vec![lower(&scope, &mut graph, formula)];
+        for state in &self.effect.states {
+            outputs.push(lower(&scope, &mut graph, &state.rate));
+            let ends = state.within.as_ref();
+            for end in 0..2 {
+                let end = ends.map(|ends| lower(&scope, &mut graph, &ends[end]));
+                outputs.push(end.unwrap_or_else(|| graph.constant(0.0)));
+            }
+        }
+        Ok(graph.finish(&outputs))
     }
 
     /// The names of the effect's parameters on its joint, distinct from names already `taken`.
     pub fn parameter_names(&self, taken: &[&str]) -> Vec<String> {
-        let plain = |own: &str| match self.shifted() {
+        let names = self.effect.names();
+        names.map(|own| self.name_of(own, taken)).collect()
+    }
+
+    /// The names of its states on its joint, distinct from names already `taken`.
+    pub(super) fn state_names(&self, taken: &[&str]) -> Vec<String> {
+        let states = self.effect.states.iter();
+        states.map(|own| self.name_of(&own.name, taken)).collect()
+    }
+
+    fn name_of(&self, own: &str, taken: &[&str]) -> String {
+        let plain = match self.shifted() {
             Some(_) => format!("{own}_shift"),
             None => self.joint.name(own),
         };
-        let name = |own: &str| match plain(own) {
-            plain if taken.contains(&plain.as_str()) => {
-                format!("{}_{plain}", self.effect.name)
-            }
-            plain => plain,
-        };
-        self.effect
-            .parameters
-            .iter()
-            .map(|p| name(&p.name))
-            .collect()
+        match taken.contains(&plain.as_str()) {
+            true => format!("{}_{plain}", self.effect.name),
+            false => plain,
+        }
     }
 
     /// The effect's parameters as those of a model, with names that are not `taken`.
@@ -170,7 +204,7 @@ impl FittedEffect {
                 unit: unit_on(prismatic, &parameter.unit),
                 bounds: match parameter.measure {
                     Measure::One => parameter.bounds,
-                    Measure::Speed | Measure::Torque => [0.0, f64::INFINITY],
+                    Measure::Speed | Measure::Torque | Measure::Duration => [0.0, f64::INFINITY],
                 },
                 fixed: self.fixed || parameter.whole,
                 per_log: parameter.per_log,

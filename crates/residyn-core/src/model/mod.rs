@@ -17,6 +17,7 @@ mod file;
 mod filter;
 mod fitted;
 mod input_layout;
+mod internal_state;
 mod library;
 mod like;
 mod like_in_file;
@@ -42,11 +43,14 @@ mod written;
 pub use call::{Call, InputFile};
 pub use configuration::{Configuration, InLog};
 pub use dynamics::{Dynamics, Parameter, PerLogValue};
-pub use effect::{ActsOn, AlikeOn, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure, ShowsIn};
+pub use effect::{
+    ActsOn, AlikeOn, EFFECT_NAMES, Effect, EffectParameter, Entry, Logged, Measure, ShowsIn,
+};
 pub use error::ModelError;
 pub use filter::{CommandFilter, Filter};
 pub use fitted::{FittedEffect, Status};
 pub use input_layout::InputLayout;
+pub use internal_state::{Dependence, InternalState, InternalStates};
 pub use library::Library;
 pub use measured_in_file::MeasuredQuantity;
 pub use network::to_f32;

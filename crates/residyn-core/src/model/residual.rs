@@ -80,7 +80,7 @@ pub fn with_residual(dynamics: &Dynamics, mlp: &MlpWeights) -> Result<Dynamics, 
         &inputs[layout.velocities()],
         &inputs[layout.driving()],
     );
-    let first = outputs.len() - residual.len();
+    let first = layout.internal().start - residual.len();
     for (output, part) in outputs[first..].iter_mut().zip(residual) {
         *output = graph.add(*output, part);
     }
@@ -109,6 +109,7 @@ pub fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics {
         measured: Vec::new(),
         parameters: Vec::new(),
         program: graph.finish(&rates),
+        internal: None,
         filters: Vec::new(),
         reading: None,
         own: Vec::new(),

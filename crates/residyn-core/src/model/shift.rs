@@ -82,6 +82,7 @@ fn shift(k: usize, declared: &Parameter) -> Effect {
             whole: false,
             per_log: false,
         }],
+        states: Vec::new(),
         valid_if: None,
         contains: Vec::new(),
         confused_with: vec!["actuator_gain".into(), "rotor_inertia".into()],

@@ -156,9 +156,30 @@ impl Model {
         }
     }
 
+    /// Refuses a model with effects that have states of their own or that reads further measured columns, for what has
+    /// neither: `what`, such as "an exported file".
+    ///
+    /// # Errors
+    /// The first column or effect of this kind.
+    pub fn stands_alone(&self, what: &'static str) -> Result<(), ModelError> {
+        self.runs_without_logs(what)?;
+        let mut effects = self.effects.iter();
+        match effects.find(|effect| !effect.effect.states.is_empty()) {
+            None => Ok(()),
+            Some(effect) => Err(ModelError::HasInternalStates {
+                model: self.name.clone(),
+                effect: effect.label(),
+                what,
+            }),
+        }
+    }
+
     /// Places of the inputs of the model's programs.
-    pub(super) fn layout(&self) -> InputLayout {
-        InputLayout::of(self.joints).with_measured(self.measured.len())
+    pub(crate) fn layout(&self) -> InputLayout {
+        let effects = self.effects.iter();
+        InputLayout::of(self.joints)
+            .with_internal(effects.map(|effect| effect.effect.states.len()).sum())
+            .with_measured(self.measured.len())
     }
 
     /// The names that formulas of the motion may use before any `let`: states, torques, further measured columns, time,

@@ -144,6 +144,7 @@ tables! {
     /// The file of an effect.
     struct EffectFile<'a> {
         effect: EffectTable<'a>,
+        states: Named<InternalStateTable<'a>>,
         parameters: Named<EffectParameterTable<'a>>,
     }
 
@@ -154,6 +155,7 @@ tables! {
         torque: Option<Located<Formula>>,
         angle: Option<Located<Formula>>,
         inertia: Option<Located<Formula>>,
+        friction: Option<Located<Formula>>,
         command: Option<CommandFilter>,
         reading: Option<Located<Formula>>,
         coupling: Option<Located<Formula>>,
@@ -166,6 +168,14 @@ tables! {
         alike_on: Option<AlikeOn>,
         valid_if: Option<Located<Formula>>,
         baseline: Option<usize>,
+    }
+
+    struct InternalStateTable<'a> {
+        rate: Located<Formula>,
+        unit: String,
+        about: Option<String>,
+        start: Option<Located<Formula>>,
+        within: Option<[Located<Formula>; 2]>,
     }
 
     struct EffectParameterTable<'a> {

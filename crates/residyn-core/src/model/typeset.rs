@@ -73,7 +73,17 @@ impl FittedEffect {
     /// The effect's formula in the names of its joint and of its parameters, in LaTeX.
     pub fn latex(&self, names: &[String], driven_by: Quantity) -> String {
         match self.program(names) {
-            Ok(program) => program.latex_formula(0),
+            Ok(program) => {
+                let state = |(name, [rate, low, high]): (String, [usize; 3])| {
+                    let [rate, low, high] = [rate, low, high].map(|k| program.latex_formula(k));
+                    let name = latex_name(&name);
+                    let within = format!(",\\; {low} \\le {name} \\le {high}");
+                    let within = if low == high { String::new() } else { within };
+                    format!(",\\quad \\dot {{{name}}} = {rate}{within}")
+                };
+                let states = self.printed_states().map(state);
+                program.latex_formula(0) + &states.collect::<String>()
+            }
             Err(filter) => {
                 let driven = latex_name(&self.joint.name(driven_by.key()));
                 filter.latex(&driven, &latex_name(&names[0]))
@@ -95,6 +105,7 @@ impl FittedEffect {
                 typeset(&self.joint.next().name("tau"))
             ),
             Entry::Inertia(_) => "added to the joint's own entry of the mass matrix".to_owned(),
+            Entry::Friction(_) => "times the friction of the joint".to_owned(),
             Entry::Shift(..) => "added to a parameter".to_owned(),
             Entry::Command(_) => format!("between the command and {}", of_joint("tau")),
             Entry::Reading(_) => format!("what the sensor shows for {}", of_joint("q")),

@@ -261,8 +261,11 @@ trait Word: Copy + 'static {
 }
 
 impl Word for Measure {
-    const WORDS: &'static [(&'static str, Self)] =
-        &[("speed", Self::Speed), ("torque", Self::Torque)];
+    const WORDS: &'static [(&'static str, Self)] = &[
+        ("speed", Self::Speed),
+        ("torque", Self::Torque),
+        ("duration", Self::Duration),
+    ];
 }
 
 impl Word for CommandFilter {

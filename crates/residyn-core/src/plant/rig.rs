@@ -43,7 +43,11 @@ impl<'d> Rig<'d> {
         step_s: f64,
         noise: Noise,
     ) -> Self {
-        assert_eq!(start.len(), dynamics.states(), "one value for each state");
+        assert_eq!(
+            start.len(),
+            2 * dynamics.joints,
+            "two values for each joint"
+        );
         Self {
             environment: Environment::new(dynamics, integrator, step_s),
             noise,

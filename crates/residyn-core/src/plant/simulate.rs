@@ -51,7 +51,7 @@ impl Plant {
         let by_joint: Vec<Vec<f64>> = (0..n).map(of_joint).collect();
         let commands = [&Commands::new(&dynamics, &times, &by_joint)];
         let mut simulator = Simulator::new(&dynamics, RK4);
-        simulator.put(&self.as_read(&self.recording.start));
+        simulator.place(&self.as_read(&self.recording.start));
         for (row, (&time, tau)) in times.iter().zip(&driving).enumerate() {
             let [angles, _] = simulator.shown(commands, [row]);
             self.measure(&mut log, time, angles, tau, rng);

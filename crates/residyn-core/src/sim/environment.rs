@@ -44,7 +44,7 @@ impl<'d> Environment<'d> {
         }
         let commands = Commands::new(&self.model, &self.past.time, &self.past.tau);
         let held: Vec<_> = tau.iter().map(|tau| Row([*tau])).collect();
-        self.simulator.put(state);
+        self.simulator.place(state);
         self.simulator.advance(&Hold::lasting(
             [&commands],
             &held,
@@ -59,7 +59,7 @@ impl<'d> Environment<'d> {
 
     /// The angles that sensors show of `state` at the end of the last step, or before the first, at `time_s`.
     pub fn angles(&mut self, state: &[f64], time_s: f64) -> Vec<f64> {
-        self.simulator.put(state);
+        self.simulator.place(state);
         let shown = self.simulator.angles_at(Row([time_s]));
         shown.iter().map(|Row([angle])| *angle).collect()
     }

@@ -4,6 +4,7 @@ pub mod batch;
 mod command;
 mod environment;
 mod integrator;
+mod internal;
 pub mod metric;
 mod objective;
 mod point;
@@ -17,6 +18,9 @@ mod window;
 pub use command::{Commands, Mean, StepTorque};
 pub use environment::Environment;
 pub use integrator::{Integrator, IntegratorError};
+#[cfg(test)]
+pub(crate) use internal::tests::bristles;
+pub use internal::{Case, Course, InternalRates, InternalStart, LoggedMotion, internal_along};
 pub use objective::Objective;
 pub use point::Point;
 pub use scheme::{RK4, SCHEMES, SEMI_IMPLICIT_EULER, Scheme, Stage};

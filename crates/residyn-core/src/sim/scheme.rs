@@ -41,6 +41,16 @@ pub const SEMI_IMPLICIT_EULER: &Scheme = &Scheme {
     most_damping: 2.0,
 };
 
+/// Heun 1900.
+pub const HEUN: &Scheme = &Scheme {
+    name: "heun",
+    title: "method of Heun",
+    order: 2,
+    stages: &stages([0.0, 1.0], [0.5, 0.5]),
+    semi_implicit: false,
+    most_damping: 2.0,
+};
+
 /// Kutta 1901.
 pub const RK4: &Scheme = &Scheme {
     name: "rk4",
@@ -55,18 +65,7 @@ pub const RK4: &Scheme = &Scheme {
 };
 
 /// Every scheme. A new one is one more entry here.
-pub const SCHEMES: [&Scheme; 3] = [
-    SEMI_IMPLICIT_EULER,
-    &Scheme {
-        name: "heun",
-        title: "method of Heun",
-        order: 2,
-        stages: &stages([0.0, 1.0], [0.5, 0.5]),
-        semi_implicit: false,
-        most_damping: 2.0,
-    },
-    RK4,
-];
+pub const SCHEMES: [&Scheme; 3] = [SEMI_IMPLICIT_EULER, HEUN, RK4];
 
 impl Scheme {
     /// The scheme of this name.

@@ -1,6 +1,6 @@
 use std::borrow::Cow;
 
-use super::{Commands, Point};
+use super::{Commands, Point, internal_along};
 use crate::data::{Log, half_width_s, local_cubic};
 use crate::expr::Tape;
 use crate::lanes::Row;
@@ -38,7 +38,7 @@ impl<const W: usize> Sensors<W> {
         }
     }
 
-    /// The angles (`[n][lane]`) measured in `state` (`[2n][lane]`) at `time` (s). `given` (`[channel][lane]`) are the torques
+    /// The angles (`[n][lane]`) measured in `state` (`[state][lane]`) at `time` (s). `given` (`[channel][lane]`) are the torques
     /// that acted until then, and the model's further measured columns.
     pub fn show<'s>(
         &'s mut self,
@@ -61,7 +61,7 @@ impl<const W: usize> Sensors<W> {
         &self.shown
     }
 
-    /// Replace the measured angles in `state` by those of the rig. Their difference is small, and is evaluated at the
+    /// Replace the measured angles in `state` (`[state][lane]`) by those of the rig. Their difference is small, and is evaluated at the
     /// measured angles.
     pub fn correct(
         &mut self,
@@ -89,12 +89,13 @@ pub fn with_own_angles<'l, 'd>(model: impl Into<Point<'d>>, log: &'l Log) -> Cow
         return Cow::Borrowed(log);
     }
     let commands = Commands::of_log(&model, log);
+    let internal = internal_along(&model, log, &commands);
     let mut sensors = Sensors::<1>::new(model);
     let mut own = log.clone();
     for _ in 0..PASSES {
         let speeds = speeds(&own);
         for row in 0..log.rows() {
-            let columns = log.q.iter().chain(&speeds);
+            let columns = log.q.iter().chain(&speeds).chain(&internal);
             let mut state: Vec<Row<f64, 1>> = columns.map(|column| Row([column[row]])).collect();
             let before = || Commands::just_before([&commands], [row]);
             sensors.correct(&mut state, before, Row([log.time[row]]));

@@ -1,16 +1,16 @@
 use super::{Commands, Point, Scheme, Sensors, StepTorque, Stepper, substeps};
 use crate::lanes::Row;
+use crate::model::InputLayout;
 
 /// `W` trajectories of one model side by side: torques are commanded and held, delays and lags turn them into the
 /// acting torques, a scheme integrates the motion, and sensors show its angles.
 pub struct Simulator<const W: usize> {
-    /// `[2n][lane]`: positions, then velocities.
+    /// `[state][lane]`: positions, velocities, then internal states.
     pub state: Vec<Row<f64, W>>,
     stepper: Stepper<W>,
     sensors: Sensors<W>,
     torque: StepTorque<W>,
-    /// Number of torques and further measured columns.
-    channels: usize,
+    layout: InputLayout,
 }
 
 /// An interval over which commanded torques are held, one interval per lane.
@@ -70,12 +70,16 @@ fn difference<const W: usize>(from: &Row<f64, W>, to: &Row<f64, W>) -> Row<f64, 
 }
 
 impl<const W: usize> Simulator<W> {
-    /// A model at rest at zero.
+    /// A model at rest at zero, with its internal states as before a log.
     pub fn new<'d>(model: impl Into<Point<'d>>, scheme: &'static Scheme) -> Self {
         let model = model.into();
+        let layout = model.dynamics.layout();
+        let starts = model.dynamics.internal_starts(model.values());
+        let mut state = vec![Row::splat(0.0); layout.internal().start];
+        state.extend(starts.iter().map(|start| Row::splat(*start)));
         Self {
-            state: vec![Row::splat(0.0); model.dynamics.states()],
-            channels: model.dynamics.layout().given().len(),
+            state,
+            layout,
             sensors: Sensors::new(model.clone()),
             stepper: Stepper::new(model, scheme),
             torque: StepTorque::default(),
@@ -110,28 +114,45 @@ impl<const W: usize> Simulator<W> {
         let before = || Commands::just_before(commands, rows);
         let time = Commands::times(commands, rows);
         let angles = self.sensors.show(&self.state, before, time);
-        [angles, &self.state[angles.len()..]]
+        [angles, &self.state[self.layout.velocities()]]
     }
 
     /// The angles that sensors show at `time` (s), after the last hold.
     pub fn angles_at(&mut self, time: Row<f64, W>) -> &[Row<f64, W>] {
-        let before = || self.torque.at_end(self.channels);
+        let before = || self.torque.at_end(self.layout.given().len());
         self.sensors.show(&self.state, before, time)
     }
 
     /// The torque (`[n][lane]`) that acted over the last part of the last hold; 0 before the first.
     pub fn acting(&self) -> Vec<Row<f64, W>> {
-        let mut given = self.torque.at_end(self.channels);
-        given.truncate(self.state.len() / 2);
+        let mut given = self.torque.at_end(self.layout.given().len());
+        given.truncate(self.layout.driving().len());
         given
     }
 }
 
 impl Simulator<1> {
-    /// Put the model in this state: positions, then velocities.
+    /// Put the model in this state.
+    ///
+    /// # Panics
+    /// When there is not one value for each state.
     pub fn put(&mut self, state: &[f64]) {
         assert_eq!(state.len(), self.state.len(), "one value for each state");
-        for (lane, value) in self.state.iter_mut().zip(state) {
+        self.write(state);
+    }
+
+    /// Put the joints at these positions, then velocities; internal states stay as they are.
+    ///
+    /// # Panics
+    /// When `motion` does not have two values for each joint.
+    pub fn place(&mut self, motion: &[f64]) {
+        let expected = self.layout.internal().start;
+        assert_eq!(motion.len(), expected, "two values for each joint");
+        self.write(motion);
+    }
+
+    fn write(&mut self, values: &[f64]) {
+        for (lane, value) in self.state.iter_mut().zip(values) {
             *lane = Row([*value]);
         }
     }

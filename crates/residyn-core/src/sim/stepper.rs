@@ -36,7 +36,7 @@ impl<const W: usize> Stepper<W> {
         self.tape.inputs()[first + parameter][lane] = value;
     }
 
-    /// Advance `state` (`[2n][lane]`: positions, then velocities) from `time` by `length` seconds in `substeps` equal
+    /// Advance `state` (`[state][lane]`: positions, velocities, then internal states) from `time` by `length` seconds in `substeps` equal
     /// substeps. What is `given`, torques and then the model's further measured columns (`[channel][lane]`), holds over all
     /// of them or, if it differs between them, `[substep * channels + channel][lane]`.
     pub fn advance(
@@ -67,6 +67,10 @@ impl<const W: usize> Stepper<W> {
     ) {
         let layout = self.layout;
         self.tape.moving()[layout.states()].copy_from_slice(state);
+        if !layout.internal().is_empty() {
+            self.tape.moving()[layout.starts()].copy_from_slice(&state[layout.internal()]);
+            self.tape.moving()[layout.step()] = *h;
+        }
         self.sum.copy_from_slice(state);
         self.tape.moving()[layout.time()] = *time;
         for stage in self.scheme.stages {

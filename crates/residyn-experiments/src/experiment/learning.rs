@@ -59,7 +59,7 @@ impl Method {
         let prior = if let Some(file) = &method.model {
             let model = read_model(beside_or_named(&config.path, file), library)?;
             let refused = |error: ModelError| config.wrong(error.to_string());
-            model.runs_without_logs("an experiment").map_err(refused)?;
+            model.stands_alone("an experiment").map_err(refused)?;
             dynamics = model.dynamics();
             model_toml.clone_from(&model.declaration);
             inputs.push((file.clone(), content_id(model_toml.as_bytes())));

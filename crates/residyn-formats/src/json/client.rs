@@ -64,6 +64,7 @@ impl SavedModel {
             name: system,
             joints,
             measured: Vec::new(),
+            internal: None,
             filters: self.equations.filters(&names)?,
             program: self.equations.program()?,
             parameters: values.map(|(p, value)| p.restore(*value)).collect(),

@@ -129,7 +129,7 @@ fn identity(config: &Value, seed: u64, model_toml: &str) -> Identity {
 pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<(Model, String), RecipeError> {
     let path = beside_or_named(&recipe.path, &recipe.model);
     let model = read_model(&path, library)?;
-    model.runs_without_logs("a trained model")?;
+    model.stands_alone("a trained model")?;
     let text = text_or_embedded(&path, Library::system_text)
         .map_err(|source| RecipeError::Open { path, source })?;
     Ok((model, text.into_owned()))

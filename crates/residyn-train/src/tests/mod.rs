@@ -56,6 +56,7 @@ pub(super) fn one_joint(formula: &str, parameters: Vec<Parameter>) -> Dynamics {
         name: "pendulum".to_owned(),
         joints: 1,
         measured: Vec::new(),
+        internal: None,
         parameters,
         program: graph.finish(&[velocity, acceleration]),
         filters: Vec::new(),

@@ -20,9 +20,8 @@ pub(super) fn measured_probes(
 ) -> Option<(Fitted, Vec<FittedEffect>)> {
     let columns = columns(problem.logs);
     let effects: Vec<Effect> = columns.iter().flat_map(probes).collect();
-    let is_driven = |effect: &Effect, joint: Joint| {
-        !effect.entry.needs_torque() || problem.top_torque[joint] > 0.0
-    };
+    let is_driven =
+        |effect: &Effect, joint: Joint| !effect.needs_torque() || problem.top_torque[joint] > 0.0;
     let on_joints = effects.iter().flat_map(|effect| {
         let joints = Joint::all(problem.declared.joints);
         let driven = joints.filter(|joint| is_driven(effect, *joint));

@@ -132,7 +132,7 @@ fn simulate(log: &mut Log, first: usize, start: &[f64], model: &Dynamics) -> Opt
     let commanded = log.clone();
     let commands = [&Commands::of_log(model, &commanded)];
     let mut simulator = Simulator::new(model, RK4);
-    simulator.put(start);
+    simulator.place(start);
     // The row of the pause, which nothing reads, has the start state.
     let columns = log.q.iter_mut().chain(&mut log.qd);
     for (column, value) in columns.zip(start) {

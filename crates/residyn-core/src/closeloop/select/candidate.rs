@@ -69,7 +69,7 @@ pub fn is_of_too_many(problem: &Problem<'_>, effect: &Effect) -> bool {
 
 /// Effects of the torque cannot be observed without torque.
 fn is_driven_enough(problem: &Problem<'_>, effect: &Effect, joint: Joint) -> bool {
-    !effect.entry.needs_torque() || problem.top_torque[joint] > 0.0
+    !effect.needs_torque() || problem.top_torque[joint] > 0.0
 }
 
 /// The candidate at each of its starting points: every combination of the searched values.

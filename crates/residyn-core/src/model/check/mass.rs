@@ -53,10 +53,12 @@ fn samples(model: &Model, rng: &mut impl Rng) -> Vec<Sample> {
     states.into_iter().map(sample).collect()
 }
 
-/// No torque, measured columns at [`NOMINAL`], and the beginning of time: what a program reads after the state.
+/// Internal states at zero, no torque, measured columns at [`NOMINAL`], and the beginning of time: what a program reads
+/// after angles and velocities.
 pub(super) fn at_rest(model: &Model) -> Vec<f64> {
+    let internal = vec![0.0; model.layout().internal().len()];
     let measured = vec![NOMINAL; model.measured.len()];
-    [vec![0.0; model.joints], measured, vec![0.0]].concat()
+    [internal, vec![0.0; model.joints], measured, vec![0.0]].concat()
 }
 
 /// Random states of this many joints, anywhere.

@@ -12,7 +12,7 @@ use crate::expr::{Formula, Unit};
 use crate::model::effect::{Effect, Entry};
 use crate::model::reader::Located;
 use crate::model::system::{Model, Motion};
-use crate::model::{MeasuredQuantity, Parameter};
+use crate::model::{InternalState, MeasuredQuantity, Parameter};
 
 /// Names and their units, if they have one.
 type Names = HashMap<String, Option<Unit>>;
@@ -191,12 +191,19 @@ impl Units<'_> {
         let measured = self.model.measured.iter();
         let measured = measured.map(|own| (own.name.clone(), declared(&own.unit)));
         let motion = motion.into_iter().chain(measured);
-        let names: Names = motion.chain(parameters).collect();
+        let states = effect.states.iter();
+        let states = states.map(|state| (state.name.clone(), declared(&state.unit)));
+        let names: Names = motion.chain(states).chain(parameters).collect();
+        for state in &effect.states {
+            self.state(line, &effect.name, state, &names);
+        }
         let (formula, of_kind) = match &effect.entry {
             Entry::Force(formula) | Entry::Torque(formula) | Entry::Coupling(formula) => {
                 (formula, "N m")
             }
-            Entry::Angle(formula) | Entry::Reading(formula) => (formula, "1"),
+            Entry::Angle(formula) | Entry::Reading(formula) | Entry::Friction(formula) => {
+                (formula, "1")
+            }
             Entry::Inertia(formula) => (formula, "kg m^2"),
             Entry::Payload(formula) => (formula, "kg"),
             Entry::Shift(..) | Entry::Command(_) => return,
@@ -212,6 +219,27 @@ impl Units<'_> {
 }
 
 impl Units<'_> {
+    /// The formulas of a state of an effect.
+    fn state(&mut self, line: Option<usize>, effect: &str, state: &InternalState, names: &Names) {
+        let Some(own) = declared(&state.unit) else {
+            return;
+        };
+        let what = |formula: &str| format!("{formula} of the state `{}` of {effect}", state.name);
+        self.fit(
+            &what("the rate"),
+            &state.rate,
+            line,
+            own.over(unit("s")),
+            names,
+        );
+        for end in state.within.iter().flatten() {
+            self.fit(&what("an end"), end, line, own, names);
+        }
+        if let Some(start) = &state.start {
+            self.fit(&what("the start"), start, line, own, names);
+        }
+    }
+
     /// The unit of a formula of the declared equations, whose misfits are reported.
     fn of(&mut self, formula: &Located<Formula>) -> Option<Unit> {
         let names = std::mem::take(&mut self.names);

@@ -1,6 +1,7 @@
 //! Parameters and intermediates that no equation and no effect uses: fits cannot find them, and changing them does nothing.
 
 use super::{Finding, Kind};
+use crate::expr::Formula;
 use crate::model::drive::Drive;
 use crate::model::effect::Effect;
 use crate::model::system::Model;
@@ -49,10 +50,15 @@ pub(super) fn find(model: &Model) -> Vec<Finding> {
 
 /// Parameters of an effect that its formula does not mention.
 fn without_use(effect: &Effect) -> Vec<String> {
-    let Some(formula) = effect.entry.formula() else {
+    if effect.is_filter() {
         return Vec::new();
-    };
-    let mut used = formula.names();
+    }
+    let starts = effect
+        .states
+        .iter()
+        .filter_map(|state| state.start.as_ref());
+    let mut used = effect.mentions();
+    used.extend(starts.flat_map(Formula::names));
     used.extend(effect.entry.needed());
     let unused = effect.names().filter(|name| !used.contains(name));
     unused

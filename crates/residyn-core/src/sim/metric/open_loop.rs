@@ -8,7 +8,8 @@ use crate::data::{Log, SAME_S, half_width_s, row_after, row_from};
 use crate::lanes::Row;
 use crate::model::Dynamics;
 use crate::sim::{
-    Commands, PREDICTION_S, Point, RK4, Simulator, Window, initial_state, with_own_angles,
+    Commands, PREDICTION_S, Point, RK4, Simulator, Window, initial_state, internal_along,
+    with_own_angles,
 };
 
 /// Windows that are integrated side by side.
@@ -156,14 +157,19 @@ pub(super) struct Replay<'l> {
     /// estimate, s.
     own: Cow<'l, Log>,
     half_width_s: f64,
+    /// `[state][row]`
+    internal: Vec<Vec<f64>>,
 }
 
 impl<'l> Replay<'l> {
     pub fn new(model: &'l Dynamics, log: &'l Log) -> Self {
         let model = Point::from(model);
+        let commands = Commands::of_log(&model, log);
+        let own = with_own_angles(&model, log);
         Self {
-            commands: Commands::of_log(&model, log),
-            own: with_own_angles(&model, log),
+            internal: internal_along(&model, &own, &commands),
+            commands,
+            own,
             half_width_s: half_width_s(log.median_step()),
             model,
             log,
@@ -205,8 +211,10 @@ impl<'l> Replay<'l> {
 
     /// The state at the window's start.
     pub fn start(&self, window: &Window) -> Vec<f64> {
-        let state = initial_state(&self.own, self.half_width_s, window.first);
-        state.expect("windows() checks this")
+        let motion = initial_state(&self.own, self.half_width_s, window.first);
+        let mut state = motion.expect("windows() checks this");
+        state.extend(self.internal.iter().map(|channel| channel[window.first]));
+        state
     }
 }
 

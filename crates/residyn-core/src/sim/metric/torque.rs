@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::data::{Joint, Log, Measured, Smooth, Smoothing, TorqueColumn};
 use crate::lanes::Row;
 use crate::model::{Dynamics, Model};
-use crate::sim::Commands;
+use crate::sim::{Commands, Point, internal_along};
 
 /// Rows that are evaluated side by side.
 const LANES: usize = 8;
@@ -187,12 +187,20 @@ fn differences(model: &Model, balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec
         tau: smoothing.delivered(log, &smoothing.whole(), (&logged.tau, &means)),
         ..logged.clone()
     };
-    let found = balance_of(&in_log, &acting);
+    let internal = internal_along(&Point::from(&*in_log), log, &commands);
+    let internal: Vec<&[f64]> = internal.iter().map(Vec::as_slice).collect();
+    let internal = smoothing.sampled_in(&smoothing.whole(), &internal);
+    let found = balance_of(&in_log, &acting, &internal);
     (model.with_drive_torques(log, logged), found)
 }
 
-/// The values of a torque balance along a smoothed motion with its torques, `[joint][row]`.
-pub(crate) fn balance_of(balance: &Dynamics, acting: &Smooth) -> Vec<Vec<f64>> {
+/// The values of a torque balance along a smoothed motion with its torques, `[joint][row]`; `internal` are its internal
+/// states, `[state][row]`.
+pub(crate) fn balance_of(
+    balance: &Dynamics,
+    acting: &Smooth,
+    internal: &[Vec<f64>],
+) -> Vec<Vec<f64>> {
     let values = balance.values();
     let first = balance.program.inputs().len() - values.len();
     let mut tape = balance.program.tape_at::<f64, LANES>(first, &values);
@@ -201,7 +209,8 @@ pub(crate) fn balance_of(balance: &Dynamics, acting: &Smooth) -> Vec<Vec<f64>> {
     for first in (0..acting.rows()).step_by(LANES) {
         let rows: [usize; LANES] = std::array::from_fn(|k| (first + k).min(acting.rows() - 1));
         let of_rows = |channel: &[f64]| Row(rows.map(|row| channel[row]));
-        let channels = (acting.q.iter().chain(&acting.qd).chain(&acting.tau))
+        let moving = acting.q.iter().chain(&acting.qd).chain(internal);
+        let channels = (moving.chain(&acting.tau))
             .chain(measured.iter().copied())
             .chain([&acting.time])
             .chain(&acting.qdd);
@@ -274,7 +283,7 @@ mod tests {
             rests: Vec::new(),
             time: time.clone(),
         };
-        let mut tau = balance_of(&acrobot(LEVEL).torque_balance().unwrap(), &motion);
+        let mut tau = balance_of(&acrobot(LEVEL).torque_balance().unwrap(), &motion, &[]);
         for (tau, t) in tau[1].iter_mut().zip(&time) {
             if now_and_then(*t)[1] == 0.0 {
                 *tau += 0.9 * LEVEL;

@@ -1,0 +1,213 @@
+//! States that effects have of their own: the deflection of a bristle, a temperature.
+
+use crate::expr::{Binary, Formula, Graph, Node, Program, Scope};
+
+use super::assemble::lower;
+use super::filter::Filter;
+use super::input_layout::InputLayout;
+
+/// A state of an effect, beside the angle and the velocity of its joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InternalState {
+    pub name: String,
+    pub unit: String,
+    pub about: String,
+    /// Its time derivative, in the names that the effect's formula may use.
+    pub rate: Formula,
+    /// Its value before a log begins, in the effect's parameters; zero if the file does not say.
+    pub start: Option<Formula>,
+    /// The ends of the range that it stays in, in the names of `rate`: at an end it moves only back.
+    pub within: Option<[Formula; 2]>,
+}
+
+/// The internal states of a compiled model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InternalStates {
+    /// As the inputs of the model's program are named.
+    pub names: Vec<String>,
+    /// The mean rate of each over a step, from the inputs of the model's program.
+    pub rates: Program,
+    /// The value of each before a log begins, from the model's parameters.
+    pub starts: Program,
+    /// What depends on what: state by state, and then by parameter.
+    pub pairs: Vec<Dependence>,
+}
+
+/// A parameter on which an internal state depends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Dependence {
+    /// Index among the internal states.
+    pub state: usize,
+    /// Index into the model's parameters.
+    pub parameter: usize,
+}
+
+impl InternalStates {
+    pub(super) fn new(
+        names: Vec<String>,
+        [rates, starts]: [Program; 2],
+        layout: InputLayout,
+        filters: &[Filter],
+    ) -> Self {
+        let states = names.len();
+        let read = |state: usize| rates.of_output(state).inputs_read();
+        let read: Vec<Vec<bool>> = (0..states).map(read).collect();
+        let mut reached: Vec<Vec<bool>> = (0..states)
+            .map(|state| starts.of_output(state).inputs_read())
+            .collect();
+        for (reached, read) in reached.iter_mut().zip(&read) {
+            for (parameter, reached) in reached.iter_mut().enumerate() {
+                let filters = filters.iter().filter(|own| own.parameter == parameter);
+                let mut filtered = filters.map(|own| read[layout.driving_of(own.joint)]);
+                *reached |= read[layout.parameters() + parameter] || filtered.any(|own| own);
+            }
+        }
+        // As many rounds as a chain of states may be long.
+        for _ in 1..states {
+            for state in 0..states {
+                for other in 0..states {
+                    let places = [layout.internal().start, layout.starts().start];
+                    if places.iter().any(|first| read[state][first + other]) {
+                        let through = reached[other].clone();
+                        let both = reached[state].iter_mut().zip(through);
+                        both.for_each(|(own, through)| *own |= through);
+                    }
+                }
+            }
+        }
+        let pairs = reached.iter().enumerate().flat_map(|(state, reached)| {
+            let reached = reached.iter().enumerate().filter(|(_, reached)| **reached);
+            reached.map(move |(parameter, _)| Dependence { state, parameter })
+        });
+        Self {
+            pairs: pairs.collect(),
+            names,
+            rates,
+            starts,
+        }
+    }
+}
+
+/// Shorter steps count as this long where a range limits a rate, s: zero steps have rates as well.
+const SHORTEST_S: f64 = 1e-9;
+
+impl InternalState {
+    /// All of its formulas that may mention more than parameters.
+    pub fn formulas(&self) -> impl Iterator<Item = &Formula> {
+        [&self.rate].into_iter().chain(self.within.iter().flatten())
+    }
+
+    /// A mean rate that leaves the state within its range.
+    fn within_ends(
+        &self,
+        graph: &mut Graph,
+        scope: &Scope,
+        [start, step]: [Node; 2],
+        mean: Node,
+    ) -> Node {
+        let Some(ends) = &self.within else {
+            return mean;
+        };
+        let [low, high] = ends.each_ref().map(|end| {
+            let end = lower(scope, graph, end);
+            let way = graph.sub(end, start);
+            graph.div(way, step)
+        });
+        let raised = graph.binary(Binary::Max, mean, low);
+        graph.binary(Binary::Min, raised, high)
+    }
+
+    /// Its value before a log begins.
+    pub(super) fn start(&self, graph: &mut Graph, scope: &Scope) -> Node {
+        match &self.start {
+            Some(formula) => lower(scope, graph, formula),
+            None => graph.constant(0.0),
+        }
+    }
+}
+
+/// The mean rates of an effect's states over a step of the length `step` that begins at `starts`, with everything else as
+/// `scope` has it.
+///
+/// With the matrix A of the rates' derivatives with respect to the states, the step is that of a linear equation whose
+/// exponential exp(A h) is taken as 1/(1 - A h + (A h)^2/2): accurate to second order, and it decays however fast the states
+/// do.
+pub(super) fn mean_rates(
+    states: &[InternalState],
+    graph: &mut Graph,
+    mut scope: Scope,
+    (starts, step): (&[Node], Node),
+) -> Vec<Node> {
+    for (state, start) in states.iter().zip(starts) {
+        scope.bind(&state.name, *start);
+    }
+    let rates = states.iter().map(|state| lower(&scope, graph, &state.rate));
+    let rates: Vec<Node> = rates.collect();
+    let growth = graph.jacobian(&rates, starts);
+    let growth = growth.into_iter().map(|row| {
+        let scaled = row.into_iter().map(|slope| graph.mul(slope, step));
+        scaled.collect::<Vec<Node>>()
+    });
+    let growth: Vec<Vec<Node>> = growth.collect();
+    let means = match (rates.as_slice(), growth.as_slice()) {
+        ([rate], [growth]) => vec![mean_of_one(graph, *rate, growth[0])],
+        ([a, b], [first, second]) => {
+            let growth = [[first[0], first[1]], [second[0], second[1]]];
+            mean_of_two(graph, [*a, *b], growth).to_vec()
+        }
+        _ => unreachable!("checked when the file was read"),
+    };
+    let shortest = graph.constant(SHORTEST_S);
+    let step = graph.binary(Binary::Max, step, shortest);
+    let each = states.iter().zip(starts).zip(means);
+    each.map(|((state, start), mean)| state.within_ends(graph, &scope, [*start, step], mean))
+        .collect()
+}
+
+/// (1 - g/2) / (1 - g + g^2/2) times the rate, for the growth g over the step.
+fn mean_of_one(graph: &mut Graph, rate: Node, growth: Node) -> Node {
+    if graph.is_zero(growth) {
+        return rate;
+    }
+    let [half, one] = [0.5, 1.0].map(|value| graph.constant(value));
+    let half = graph.mul(half, growth);
+    let above = graph.sub(one, half);
+    let square = graph.mul(half, growth);
+    let rest = graph.sub(one, growth);
+    let below = graph.add(rest, square);
+    let share = graph.div(above, below);
+    graph.mul(rate, share)
+}
+
+/// The same for two states whose growths are a matrix G: (1 - G/2) (1 - G + G^2/2)^-1 times the rates.
+fn mean_of_two(graph: &mut Graph, rates: [Node; 2], growth: [[Node; 2]; 2]) -> [Node; 2] {
+    if growth.iter().flatten().all(|entry| graph.is_zero(*entry)) {
+        return rates;
+    }
+    let [half, one, zero] = [0.5, 1.0, 0.0].map(|value| graph.constant(value));
+    let mut matrix = [[zero; 2]; 2];
+    for (row, of_row) in matrix.iter_mut().enumerate() {
+        for (column, entry) in of_row.iter_mut().enumerate() {
+            let of_column = [growth[0][column], growth[1][column]];
+            let square = graph.dot(&growth[row], &of_column);
+            let square = graph.mul(half, square);
+            let rest = if row == column { one } else { zero };
+            let rest = graph.sub(rest, growth[row][column]);
+            *entry = graph.add(rest, square);
+        }
+    }
+    let [[a, b], [c, d]] = matrix;
+    let [ad, bc] = [(a, d), (b, c)].map(|(x, y)| graph.mul(x, y));
+    let determinant = graph.sub(ad, bc);
+    let solved = [[d, b, rates[0], rates[1]], [a, c, rates[1], rates[0]]];
+    let solved = solved.map(|[own, other, rate, further]| {
+        let [plus, minus] = [(own, rate), (other, further)].map(|(x, y)| graph.mul(x, y));
+        let above = graph.sub(plus, minus);
+        graph.div(above, determinant)
+    });
+    [0, 1].map(|row| {
+        let moved = graph.dot(&growth[row], &solved);
+        let moved = graph.mul(half, moved);
+        graph.sub(solved[row], moved)
+    })
+}
