@@ -125,12 +125,6 @@ impl<T: Element, const W: usize> Tape<T, W> {
         &self.values[self.outputs[k] as usize]
     }
 
-    /// Number of outputs.
-    #[inline(always)]
-    pub fn output_count(&self) -> usize {
-        self.outputs.len()
-    }
-
     /// Evaluate the program in every lane.
     pub fn run(&mut self) {
         Row::<T, W>::dispatch(CarryOut(self));

@@ -23,9 +23,9 @@ pub enum Local {
 /// The tangent-linear model: accelerations and their derivatives with respect to states, shared parameters and forces,
 /// as one program.
 ///
-/// Outputs: the n accelerations and the rates of the internal states; for each of these slopes its derivatives with
-/// respect to the states; per active parameter, and per force if forces are free, the derivatives of all slopes; for each
-/// internal state the derivatives of its rate with respect to those at the step's start. dq/dt = qd is assumed. Of a
+/// Outputs: the n accelerations and the rates of the internal states; per joint the derivatives of its acceleration with
+/// respect to all states; per active parameter, and per force if forces are free, the derivatives of all these slopes; then
+/// those of the internal states' rates that `internal_rows` places. dq/dt = qd is assumed. Of a
 /// torque balance: the n differences, then for each difference its derivatives with respect to the active parameters that
 /// it depends on. Inputs: those of the model, with the derivatives of the torques with respect to filter parameters, and
 /// in a torque balance those of the internal states with respect to parameters, inserted before its parameters.
@@ -43,10 +43,20 @@ pub(super) struct Tangent {
     pub first_parameter: usize,
     /// Indices into the model's parameters.
     pub active: Vec<usize>,
+    /// The derivatives of each internal state's rate that are not zero.
+    internal_rows: Vec<InternalRow>,
     /// For a torque balance, the columns that each joint's difference depends on; else empty.
     pub columns_of: Vec<Vec<usize>>,
     /// Number of free values of one window.
     start_states: usize,
+}
+
+/// Derivatives of the rate of an internal state that are not zero, by the state that they are with respect to: each with its
+/// output.
+#[derive(Default)]
+struct InternalRow {
+    by_state: Vec<(usize, usize)>,
+    by_start: Vec<(usize, usize)>,
 }
 
 impl Tangent {
@@ -56,12 +66,13 @@ impl Tangent {
             Local::State | Local::StateAndForce => layout.parameters(),
             Local::Nothing => layout.parameters_of_balance(),
         };
-        let pairs = match (local, &dynamics.internal) {
-            (Local::Nothing, Some(internal)) => internal.pairs.as_slice(),
-            _ => &[],
+        let internal = InternalRates::with_slopes(dynamics, active);
+        let pairs = match (local, &internal) {
+            (Local::Nothing, Some(internal)) => internal.pairs().to_vec(),
+            _ => Vec::new(),
         };
-        let model = Differentiated::new(dynamics, first, pairs);
-        let (start_states, reading, (program, columns_of)) = match local {
+        let model = Differentiated::new(dynamics, first, &pairs);
+        let (start_states, reading, compiled) = match local {
             Local::State => (
                 2 * n,
                 reading(dynamics, active),
@@ -73,10 +84,16 @@ impl Tangent {
             }
             Local::Nothing => (0, None, model.of_torques(active)),
         };
+        let Compiled {
+            program,
+            internal_rows,
+            columns_of,
+        } = compiled;
         Self {
             program,
             reading,
-            internal: InternalRates::with_slopes(dynamics),
+            internal_rows,
+            internal,
             joints: n,
             layout,
             first_parameter: first + dynamics.filters.len() + pairs.len(),
@@ -96,7 +113,7 @@ impl Tangent {
     #[inline(always)]
     fn direct(&self, column: usize) -> Option<usize> {
         let (n, shared, slopes) = (self.joints, self.active.len(), self.slope_count());
-        let others = slopes * (1 + self.states());
+        let others = slopes + n * self.states();
         match column.checked_sub(1) {
             None => Some(0),
             Some(parameter) if parameter < shared => Some(others + slopes * parameter),
@@ -115,9 +132,16 @@ impl Tangent {
         self.states() - self.joints
     }
 
-    /// The output with the derivative of the k-th slope with respect to a state.
-    pub fn by_state(&self, slope: usize, state: usize) -> usize {
-        self.slope_count() + slope * self.states() + state
+    /// The output with the derivative of a joint's acceleration with respect to a state.
+    pub fn by_state(&self, joint: usize, state: usize) -> usize {
+        self.slope_count() + joint * self.states() + state
+    }
+
+    /// The output with the derivative of an internal state's rate with respect to a state, unless it is zero.
+    pub fn rate_by_state(&self, internal: usize, state: usize) -> Option<usize> {
+        let mut row = self.internal_rows[internal].by_state.iter();
+        row.find(|(own, _)| *own == state)
+            .map(|(_, output)| *output)
     }
 
     /// For a torque balance: for each joint the columns that its difference depends on, and the outputs with its slopes
@@ -130,6 +154,13 @@ impl Tangent {
             (columns.as_slice(), first..next)
         })
     }
+}
+
+/// A program of [`Tangent`] with the places of its outputs.
+struct Compiled {
+    program: Program,
+    internal_rows: Vec<InternalRow>,
+    columns_of: Vec<Vec<usize>>,
 }
 
 /// A model's program in a graph, to be differentiated.
@@ -194,14 +225,17 @@ impl<'d> Differentiated<'d> {
                 row[first_active + column] = self.graph.mul(by_torque[0], *slope);
             }
         }
+        if self.pairs.is_empty() {
+            return jacobian;
+        }
+        let internal = &self.inputs[self.dynamics.layout().internal()];
+        let by_internal = self.graph.jacobian(outputs, internal);
         for (Dependence { state, parameter }, slope) in &self.pairs {
             let Some(column) = active.iter().position(|k| k == parameter) else {
                 continue;
             };
-            let state = self.inputs[self.dynamics.layout().internal().start + state];
-            let by_state = self.graph.jacobian(outputs, &[state]);
-            for (row, by_state) in jacobian.iter_mut().zip(by_state) {
-                let through = self.graph.mul(by_state[0], *slope);
+            for (row, by_internal) in jacobian.iter_mut().zip(&by_internal) {
+                let through = self.graph.mul(by_internal[*state], *slope);
                 let own = &mut row[first_active + column];
                 *own = self.graph.add(*own, through);
             }
@@ -210,28 +244,43 @@ impl<'d> Differentiated<'d> {
     }
 
     /// The program of [`Tangent`] for a motion; no difference of torques depends on a column.
-    fn of_motion(mut self, active: &[usize], forces: Range<usize>) -> (Program, Vec<Vec<usize>>) {
+    fn of_motion(mut self, active: &[usize], forces: Range<usize>) -> Compiled {
         let slopes = self.outputs.split_off(self.dynamics.joints);
         let layout = self.dynamics.layout();
         let states = layout.states();
         let jacobian = self.jacobian(&slopes, states.clone(), active, forces.clone());
-        let by_states = jacobian.iter().flat_map(|row| &row[states.clone()]);
+        let (of_joints, of_internal) = jacobian.split_at(self.dynamics.joints);
+        let by_states = of_joints.iter().flat_map(|row| &row[states.clone()]);
         let others = states.end..states.end + active.len() + forces.len();
         let others = others.flat_map(|k| jacobian.iter().map(move |row| &row[k]));
         let rates = &slopes[self.dynamics.joints..];
         let of_starts = self.graph.jacobian(rates, &self.inputs[layout.starts()]);
-        let of_starts = of_starts.concat();
-        let all = slopes
-            .iter()
-            .chain(by_states)
-            .chain(others)
-            .chain(&of_starts);
-        let all: Vec<Node> = all.copied().collect();
-        (self.graph.finish(&all), Vec::new())
+        let all = slopes.iter().chain(by_states).chain(others);
+        let mut all: Vec<Node> = all.copied().collect();
+        let mut placed = |row: &[Node], first: usize| {
+            let mut places = Vec::new();
+            for (k, slope) in row.iter().enumerate() {
+                if !self.graph.is_zero(*slope) {
+                    places.push((first + k, all.len()));
+                    all.push(*slope);
+                }
+            }
+            places
+        };
+        let rows = of_internal.iter().zip(&of_starts);
+        let internal_rows = rows.map(|(by_state, by_start)| InternalRow {
+            by_state: placed(&by_state[states.clone()], 0),
+            by_start: placed(by_start, layout.internal().start),
+        });
+        Compiled {
+            internal_rows: internal_rows.collect(),
+            program: self.graph.finish(&all),
+            columns_of: Vec::new(),
+        }
     }
 
     /// The program of [`Tangent`] for a torque balance, and the columns that each difference depends on.
-    fn of_torques(mut self, active: &[usize]) -> (Program, Vec<Vec<usize>>) {
+    fn of_torques(mut self, active: &[usize]) -> Compiled {
         let differences = std::mem::take(&mut self.outputs);
         let jacobian = self.jacobian(&differences, 0..0, active, 0..0);
         let depends = |row: &Vec<Node>| -> Vec<usize> {
@@ -244,7 +293,11 @@ impl<'d> Differentiated<'d> {
         let own = jacobian.iter().zip(&columns_of);
         let slopes = own.flat_map(|(row, columns)| columns.iter().map(|column| row[*column]));
         let outputs: Vec<Node> = differences.into_iter().chain(slopes).collect();
-        (self.graph.finish(&outputs), columns_of)
+        Compiled {
+            program: self.graph.finish(&outputs),
+            internal_rows: Vec::new(),
+            columns_of,
+        }
     }
 }
 
@@ -276,7 +329,7 @@ pub(super) struct TangentStepper<'t> {
     inner: Vec<Lane>,
     next: Vec<Lane>,
     sum: Vec<Lane>,
-    /// Derivatives of the slopes with respect to the states, `[slope * states + state]`.
+    /// Derivatives of the accelerations with respect to the states, `[joint * states + state]`.
     by_state: Vec<Lane>,
     reading: Option<Tape<f64, LANES>>,
     /// The measured angles, then their sensitivities `[joint * columns + column]`.
@@ -298,7 +351,7 @@ impl<'t> TangentStepper<'t> {
             inner: rows(size),
             next: rows(size),
             sum: rows(size),
-            by_state: rows(tangent.slope_count() * tangent.states()),
+            by_state: rows(n * tangent.states()),
             reading: (tangent.reading.as_ref()).map(|reading| reading.tape_at(first_read, values)),
             shown: rows(n * (1 + tangent.columns())),
         }
@@ -507,13 +560,12 @@ impl<'t> TangentStepper<'t> {
         reached: &Lane,
     ) {
         let rows = 2 * n + internal;
-        let of_starts = self.tape.output_count() - internal * internal;
         let inner = if is_first { &self.now } else { &self.inner };
         let columns = (self.now.chunks_exact(rows))
             .zip(inner.chunks_exact(rows))
             .zip(self.next.chunks_exact_mut(rows))
             .zip(self.sum.chunks_exact_mut(rows));
-        let by_state = &self.by_state[..(n + internal) * rows];
+        let by_state = &self.by_state[..n * rows];
         for (column, (((now, inner), next), sum)) in columns.enumerate() {
             let direct = self.tangent.direct(column);
             for part in 0..Lane::parts::<S>() {
@@ -526,16 +578,18 @@ impl<'t> TangentStepper<'t> {
                             Some(first) => self.tape.output(first + row - n).get(simd, part),
                             None => weighed.like(0.0),
                         };
-                        if column > 0 {
+                        if column > 0 && row < 2 * n {
                             for state in 0..rows {
                                 let by_state = by_state[(row - n) * rows + state].get(simd, part);
                                 slope = by_state.mul_add(inner[state].get(simd, part), slope);
                             }
-                            if row >= 2 * n {
-                                let first = of_starts + (row - 2 * n) * internal;
-                                for (k, start) in now[2 * n..].iter().enumerate() {
-                                    let by_start = self.tape.output(first + k).get(simd, part);
-                                    slope = by_start.mul_add(start.get(simd, part), slope);
+                        } else if column > 0 {
+                            let InternalRow { by_state, by_start } =
+                                &self.tangent.internal_rows[row - 2 * n];
+                            for (of, values) in [(by_state, inner), (by_start, now)] {
+                                for (state, output) in of {
+                                    let by = self.tape.output(*output).get(simd, part);
+                                    slope = by.mul_add(values[*state].get(simd, part), slope);
                                 }
                             }
                         }

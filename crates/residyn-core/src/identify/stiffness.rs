@@ -52,12 +52,12 @@ fn fastest_decay<'l>(
     tape.run();
     let decay = |joint: usize, lane: usize| -tape.output(tangent.by_state(joint, n + joint))[lane];
     let swing = |joint: usize, lane: usize| -> f64 {
-        let by = |slope: usize, state: usize| tape.output(tangent.by_state(slope, state))[lane];
-        let internal = layout.internal().map(|state| {
-            let held = by(joint, state) * by(state - n, n + joint);
-            (-held).max(0.0)
-        });
-        internal.sum::<f64>().sqrt()
+        let held = |state: usize| {
+            let rate = tangent.rate_by_state(state - 2 * n, n + joint)?;
+            let force = tape.output(tangent.by_state(joint, state))[lane];
+            Some((-force * tape.output(rate)[lane]).max(0.0))
+        };
+        layout.internal().filter_map(held).sum::<f64>().sqrt()
     };
     let of_joint = |joint: usize, lane: usize| decay(joint, lane).max(0.0) + swing(joint, lane);
     let all = |lane: usize| -> f64 { (0..n).map(|joint| of_joint(joint, lane)).sum() };

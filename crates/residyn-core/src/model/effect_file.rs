@@ -49,6 +49,7 @@ impl Effect {
             parameters,
             states,
             contains: table.contains,
+            refines: table.refines,
             confused_with: table.confused_with,
             shown_by: table.shown_by.unwrap_or_default(),
             baseline: table.baseline,

@@ -85,6 +85,7 @@ fn shift(k: usize, declared: &Parameter) -> Effect {
         states: Vec::new(),
         valid_if: None,
         contains: Vec::new(),
+        refines: false,
         confused_with: vec!["actuator_gain".into(), "rotor_inertia".into()],
         shown_by: format!(
             "a measurement of `{}` itself, or motion after it has been changed by a known amount",

@@ -161,6 +161,7 @@ tables! {
         coupling: Option<Located<Formula>>,
         payload: Option<Located<Formula>>,
         contains: Vec<String>,
+        refines: bool,
         confused_with: Vec<String>,
         shown_by: Option<String>,
         joints: Option<ActsOn>,

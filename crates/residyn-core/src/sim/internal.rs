@@ -10,7 +10,7 @@ use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::Row;
 use crate::model::{Dependence, Dynamics, Filter, InputLayout, InternalStates};
 
-/// Logs that are walked along side by side.
+/// The most logs that are walked along side by side.
 const LANES: usize = 8;
 /// Rows nearer together than this, s, are taken as one step: what dry friction remembers depends on the way alone, and
 /// states that decay are accurate to second order in the step.
@@ -53,96 +53,153 @@ impl LoggedMotion {
     }
 }
 
-/// The rates of a model's internal states, with their derivatives if slopes are asked for.
+/// The rates of a model's internal states and, if asked for, of their slopes by parameters.
 ///
-/// Inputs: those of the model's program. Outputs: the rates; for each its derivatives with respect to the internal states,
-/// to those at the step's start, to the `columns`, and to the torques of the filters.
+/// Inputs of the program: those of the model's program. Outputs: the rates, then the factors of the `terms`.
 #[derive(Debug, Clone)]
 pub struct InternalRates {
     program: Program,
     layout: InputLayout,
     internal: InternalStates,
-    /// The starts' derivatives, `[state * columns + column]`, from the model's parameters.
+    /// What there are slopes of.
+    pairs: Vec<Dependence>,
+    /// For each of the pairs the terms that make up the rate of its slope.
+    terms: Vec<Vec<Term>>,
+    /// The slopes of the starts, in the order of the pairs, from the model's parameters.
     start_slopes: Program,
     filters: Vec<Filter>,
-    /// Parameters of the model with respect to which there are slopes.
-    columns: Vec<usize>,
-    reads_torques: bool,
+    /// For each input whether a rate depends on it.
+    reads: Vec<bool>,
+}
+
+/// A part of the rate of a slope: an output of the program times something.
+#[derive(Debug, Clone, Copy)]
+struct Term {
+    factor: usize,
+    times: Times,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Times {
+    One,
+    /// The slope of a pair, now or at the start of the step.
+    Now(usize),
+    Start(usize),
+    /// The slope of the torque of a filter.
+    Filter(usize),
 }
 
 impl InternalRates {
     /// The rates alone; `None` for a model without internal states.
     pub fn plain(dynamics: &Dynamics) -> Option<Self> {
         let internal = dynamics.internal.as_ref()?;
-        Some(Self::new(dynamics, internal, Vec::new()))
-    }
-
-    /// With the slopes of [`InternalStates::pairs`].
-    pub fn with_slopes(dynamics: &Dynamics) -> Option<Self> {
-        let internal = dynamics.internal.as_ref()?;
-        let mut columns: Vec<usize> = internal.pairs.iter().map(|pair| pair.parameter).collect();
-        columns.sort_unstable();
-        columns.dedup();
-        Some(Self::new(dynamics, internal, columns))
-    }
-
-    fn new(dynamics: &Dynamics, internal: &InternalStates, columns: Vec<usize>) -> Self {
-        let layout = dynamics.layout();
-        let read = internal.rates.inputs_read();
-        let reads_torques = read[layout.driving()].contains(&true);
-        Self {
-            program: match columns.is_empty() {
-                true => internal.rates.clone(),
-                false => differentiated(dynamics, internal, &columns),
-            },
-            layout,
-            start_slopes: start_slopes(internal, &columns),
+        Some(Self {
+            program: internal.rates.clone(),
+            reads: internal.rates.inputs_read(),
+            layout: dynamics.layout(),
             internal: internal.clone(),
+            pairs: Vec::new(),
+            terms: Vec::new(),
+            start_slopes: Graph::new().finish(&[]),
             filters: dynamics.filters.clone(),
-            columns,
-            reads_torques,
-        }
+        })
+    }
+
+    /// With the slopes of [`InternalStates::pairs`] by these parameters.
+    pub fn with_slopes(dynamics: &Dynamics, active: &[usize]) -> Option<Self> {
+        let mut plain = Self::plain(dynamics)?;
+        let pairs = plain.internal.pairs.iter().copied();
+        plain.pairs = pairs
+            .filter(|pair| active.contains(&pair.parameter))
+            .collect();
+        let (program, terms) = plain.differentiated();
+        Some(Self {
+            start_slopes: plain.start_slopes_of_pairs(),
+            program,
+            terms,
+            ..plain
+        })
+    }
+
+    /// The program with the factors of all terms, and the terms.
+    fn differentiated(&self) -> (Program, Vec<Vec<Term>>) {
+        let (layout, internal) = (self.layout, &self.internal);
+        let mut graph = Graph::new();
+        let names = internal.rates.inputs().iter();
+        let inputs: Vec<Node> = names.map(|name| graph.input(name)).collect();
+        let rates = graph.append(&internal.rates, &inputs);
+        let mut outputs = rates.clone();
+        let mut of_pair = |pair: &Dependence| {
+            let slope_of = |other: usize| {
+                let is_it =
+                    |own: &Dependence| own.state == other && own.parameter == pair.parameter;
+                self.pairs.iter().position(is_it)
+            };
+            let mut wrt = vec![(inputs[layout.parameters() + pair.parameter], Times::One)];
+            for other in 0..rates.len() {
+                let Some(slope) = slope_of(other) else {
+                    continue;
+                };
+                let [now, start] = [layout.internal(), layout.starts()].map(|of| of.start + other);
+                wrt.push((inputs[now], Times::Now(slope)));
+                wrt.push((inputs[start], Times::Start(slope)));
+            }
+            for (k, filter) in self.filters.iter().enumerate() {
+                if filter.parameter == pair.parameter {
+                    wrt.push((inputs[layout.driving_of(filter.joint)], Times::Filter(k)));
+                }
+            }
+            let nodes: Vec<Node> = wrt.iter().map(|(node, _)| *node).collect();
+            let slopes = graph.jacobian(&[rates[pair.state]], &nodes).concat();
+            let mut terms = Vec::new();
+            for (slope, (_, times)) in slopes.into_iter().zip(wrt) {
+                if !graph.is_zero(slope) {
+                    terms.push(Term {
+                        factor: outputs.len(),
+                        times,
+                    });
+                    outputs.push(slope);
+                }
+            }
+            terms
+        };
+        let terms = self.pairs.iter().map(&mut of_pair).collect();
+        (graph.finish(&outputs), terms)
+    }
+
+    fn start_slopes_of_pairs(&self) -> Program {
+        let mut graph = Graph::new();
+        let names = self.internal.starts.inputs().iter();
+        let inputs: Vec<Node> = names.map(|name| graph.input(name)).collect();
+        let starts = graph.append(&self.internal.starts, &inputs);
+        let one = graph.constant(1.0);
+        let slope = |pair: &Dependence| {
+            graph.gradient(&[starts[pair.state]], &[one], &[inputs[pair.parameter]])[0]
+        };
+        let slopes: Vec<Node> = self.pairs.iter().map(slope).collect();
+        graph.finish(&slopes)
     }
 
     /// What there are slopes of.
     pub fn pairs(&self) -> &[Dependence] {
-        &self.internal.pairs
+        &self.pairs
     }
 
     /// The internal states along some logs, each with the model's values in that log.
     pub fn along(&self, cases: &[Case<'_>]) -> Vec<Course> {
         let packs = cases.chunks(LANES);
-        packs.flat_map(|pack| self.along_some(pack)).collect()
+        let of_pack = |pack: &[Case<'_>]| match pack.len() {
+            1 => self.along_some::<1>(pack),
+            2 => self.along_some::<2>(pack),
+            3 | 4 => self.along_some::<4>(pack),
+            _ => self.along_some::<LANES>(pack),
+        };
+        packs.flat_map(of_pack).collect()
     }
-}
 
-/// The program of [`InternalRates`].
-fn differentiated(dynamics: &Dynamics, internal: &InternalStates, columns: &[usize]) -> Program {
-    let layout = dynamics.layout();
-    let mut graph = Graph::new();
-    let names = internal.rates.inputs().iter();
-    let inputs: Vec<Node> = names.map(|name| graph.input(name)).collect();
-    let rates = graph.append(&internal.rates, &inputs);
-    let mut outputs = rates.clone();
-    let torques = dynamics.filters.iter();
-    let torques = torques.map(|filter| inputs[layout.driving_of(filter.joint)]);
-    let torques: Vec<Node> = torques.collect();
-    let parameters = columns.iter().map(|k| inputs[layout.parameters() + k]);
-    let others: Vec<Node> = parameters.chain(torques).collect();
-    let states = [&inputs[layout.internal()], &inputs[layout.starts()]];
-    let wrt = [states.concat(), others].concat();
-    outputs.extend(graph.jacobian(&rates, &wrt).concat());
-    graph.finish(&outputs)
-}
-
-fn start_slopes(internal: &InternalStates, columns: &[usize]) -> Program {
-    let mut graph = Graph::new();
-    let names = internal.starts.inputs().iter();
-    let inputs: Vec<Node> = names.map(|name| graph.input(name)).collect();
-    let starts = graph.append(&internal.starts, &inputs);
-    let wrt: Vec<Node> = columns.iter().map(|k| inputs[*k]).collect();
-    let slopes = graph.jacobian(&starts, &wrt).concat();
-    graph.finish(&slopes)
+    fn reads_torques(&self) -> bool {
+        self.reads[self.layout.driving()].contains(&true)
+    }
 }
 
 /// A log with the model's values in it and its filtered commands.
@@ -155,7 +212,7 @@ pub struct Case<'a> {
 }
 
 /// The internal states at the rows of a log, `[state][row]`, and their derivatives with respect to parameters,
-/// `[pair][row]` in the order of [`InternalStates::pairs`], if asked for.
+/// `[pair][row]` in the order of [`InternalRates::pairs`], if asked for.
 #[derive(Debug, Clone, Default)]
 pub struct Course {
     pub values: Vec<Vec<f64>>,
@@ -232,7 +289,7 @@ impl InternalRates {
                 .map(|rows| rows.iter().sum::<f64>() / rows.len() as f64)
                 .collect()
         };
-        let torques = match self.reads_torques {
+        let torques = match self.reads_torques() {
             true => case.commands.acting().iter().map(mean).collect(),
             false => vec![vec![0.0; grid.len() - 1]; self.layout.driving().len()],
         };
@@ -241,7 +298,7 @@ impl InternalRates {
             let means = case.commands.delivered(filter.joint).unwrap_or_default();
             mean(&means.iter().map(|mean| mean.slope(filter.kind)).collect())
         };
-        let filters = match self.reads_torques && !self.columns.is_empty() {
+        let filters = match self.reads_torques() && !self.terms.is_empty() {
             true => self.filters.as_slice(),
             false => &[],
         };
@@ -254,10 +311,10 @@ impl InternalRates {
         }
     }
 
-    /// The states along a few logs: at each row of its grid, the states, then their slopes by each column.
-    fn along_some(&self, cases: &[Case<'_>]) -> Vec<Course> {
+    /// The states along as many logs as there are lanes, or fewer.
+    fn along_some<const W: usize>(&self, cases: &[Case<'_>]) -> Vec<Course> {
         let tracks: Vec<Track> = cases.iter().map(|case| self.track(case)).collect();
-        let mut walk = Walk::new(self, cases);
+        let mut walk = Walk::<W>::new(self, cases);
         let first = |lane: usize| walk.now.iter().map(move |now| vec![now[lane]]).collect();
         let mut courses: Vec<Vec<Vec<f64>>> = (0..cases.len()).map(first).collect();
         let steps = tracks.iter().map(Track::steps).max().unwrap_or(0);
@@ -278,14 +335,10 @@ impl InternalRates {
     /// The course at all rows of its log.
     fn course(&self, at_grid: &[Vec<f64>], motion: &LoggedMotion) -> Course {
         let at_rows = |channel: &Vec<f64>| motion.at_rows(channel);
-        let states = self.internal.names.len();
-        let slope = |pair: &Dependence| {
-            let column = self.columns.binary_search(&pair.parameter).ok()?;
-            Some(at_rows(&at_grid[states * (1 + column) + pair.state]))
-        };
+        let (values, slopes) = at_grid.split_at(self.internal.names.len());
         Course {
-            values: at_grid[..states].iter().map(at_rows).collect(),
-            slopes: self.internal.pairs.iter().filter_map(slope).collect(),
+            values: values.iter().map(at_rows).collect(),
+            slopes: slopes.iter().map(at_rows).collect(),
         }
     }
 }
@@ -312,14 +365,14 @@ impl LoggedMotion {
 }
 
 /// Steps along logs, one in each lane.
-struct Walk<'r> {
+struct Walk<'r, const W: usize> {
     rates: &'r InternalRates,
-    tape: Tape<f64, LANES>,
-    /// The states, then the slopes of all states by each column.
-    now: Vec<Row<f64, LANES>>,
+    tape: Tape<f64, W>,
+    /// The states, then their slopes.
+    now: Vec<Row<f64, W>>,
 }
 
-impl<'r> Walk<'r> {
+impl<'r, const W: usize> Walk<'r, W> {
     /// Before the first row of each log.
     fn new(rates: &'r InternalRates, cases: &[Case<'_>]) -> Self {
         let first = rates.layout.parameters();
@@ -329,15 +382,14 @@ impl<'r> Walk<'r> {
             *input = Row::from_fn(|lane| at(lane)[k]);
         }
         let starts = |lane: usize| {
-            let values = rates.internal.starts.eval(at(lane)).into_iter();
-            let slopes = rates.start_slopes.eval(at(lane));
-            let (states, columns) = (rates.internal.names.len(), rates.columns.len());
-            let of_column = |k: usize| slopes[k % states * columns + k / states];
-            values
-                .chain((0..states * columns).map(of_column))
-                .collect::<Vec<f64>>()
+            let values = rates.internal.starts.eval(at(lane));
+            let slopes = match rates.terms.is_empty() {
+                true => Vec::new(),
+                false => rates.start_slopes.eval(at(lane)),
+            };
+            [values, slopes].concat()
         };
-        let starts: Vec<Vec<f64>> = (0..LANES).map(starts).collect();
+        let starts: Vec<Vec<f64>> = (0..W).map(starts).collect();
         let now = Row::table(starts[0].len(), |k, lane| starts[lane][k]);
         Self { rates, tape, now }
     }
@@ -351,12 +403,21 @@ impl<'r> Walk<'r> {
         let states = self.rates.internal.names.len();
         let filters = 0..tracks[0].slopes.len();
         let filters = filters.map(|k| read(&|track| track.slopes[k][step]));
-        let filters: Vec<Row<f64, LANES>> = filters.collect();
+        let filters: Vec<Row<f64, W>> = filters.collect();
         let inputs = self.tape.moving();
-        for (k, place) in layout.given().enumerate() {
+        let reads = &self.rates.reads;
+        for (k, place) in layout
+            .given()
+            .enumerate()
+            .filter(|(_, place)| reads[*place])
+        {
             inputs[place] = read(&|track| track.given[k][step]);
         }
-        for (joint, place) in layout.velocities().enumerate() {
+        for (joint, place) in layout
+            .velocities()
+            .enumerate()
+            .filter(|(_, place)| reads[*place])
+        {
             inputs[place] = read(&|track| {
                 let q = &track.q[joint];
                 (q[step + 1] - q[step]) / (track.time[step + 1] - track.time[step])
@@ -367,7 +428,7 @@ impl<'r> Walk<'r> {
         let (mut sum, mut inner) = (self.now.clone(), self.now.clone());
         for stage in SCHEME.stages {
             let inputs = self.tape.moving();
-            for joint in layout.positions() {
+            for joint in layout.positions().filter(|joint| reads[*joint]) {
                 inputs[joint] = read(&|track| {
                     let q = &track.q[joint];
                     q[step] + stage.time * (q[step + 1] - q[step])
@@ -375,14 +436,14 @@ impl<'r> Walk<'r> {
             }
             let time = |track: &Track| track.time[step];
             inputs[layout.time()] = read(&time);
-            for lane in 0..LANES {
+            for lane in 0..W {
                 inputs[layout.time()][lane] += stage.time * h[lane];
             }
             inputs[layout.internal()].copy_from_slice(&inner[..states]);
             self.tape.run();
             let slopes = self.slopes(&inner, &filters);
             for (k, slope) in slopes.iter().enumerate() {
-                for lane in 0..LANES {
+                for lane in 0..W {
                     sum[k][lane] += stage.weight * h[lane] * slope[lane];
                     inner[k][lane] = self.now[k][lane] + stage.reach * h[lane] * slope[lane];
                 }
@@ -392,37 +453,26 @@ impl<'r> Walk<'r> {
     }
 
     /// The rates of the states and of their slopes, where these are `inner` and the tape has run.
-    fn slopes(
-        &self,
-        inner: &[Row<f64, LANES>],
-        filters: &[Row<f64, LANES>],
-    ) -> Vec<Row<f64, LANES>> {
-        let (states, columns) = (self.rates.internal.names.len(), self.rates.columns.len());
-        let mut slopes: Vec<Row<f64, LANES>> = (0..states).map(|k| *self.tape.output(k)).collect();
-        let each = 2 * states + columns + self.rates.filters.len();
-        for column in 0..columns {
-            for state in 0..states {
-                let by = |k: usize| self.tape.output(states + each * state + k);
-                let mut slope = *by(2 * states + column);
-                let mut add = |by: &Row<f64, LANES>, of: &Row<f64, LANES>| {
-                    (0..LANES).for_each(|lane| slope[lane] += by[lane] * of[lane]);
+    fn slopes(&self, inner: &[Row<f64, W>], filters: &[Row<f64, W>]) -> Vec<Row<f64, W>> {
+        let states = self.rates.internal.names.len();
+        let one = Row::splat(1.0);
+        let of_pair = |terms: &Vec<Term>| {
+            let mut rate = Row::splat(0.0);
+            for Term { factor, times } in terms {
+                let factor = self.tape.output(*factor);
+                let times = match *times {
+                    Times::One => &one,
+                    Times::Now(pair) => &inner[states + pair],
+                    Times::Start(pair) => &self.now[states + pair],
+                    Times::Filter(filter) => &filters[filter],
                 };
-                let own = |state: usize| states * (1 + column) + state;
-                for other in 0..states {
-                    add(by(other), &inner[own(other)]);
-                    add(by(states + other), &self.now[own(other)]);
-                }
-                let parameter = self.rates.columns[column];
-                let filtered = self.rates.filters.iter().zip(filters).enumerate();
-                for (k, (filter, slope)) in filtered {
-                    if filter.parameter == parameter {
-                        add(by(2 * states + columns + k), slope);
-                    }
-                }
-                slopes.push(slope);
+                (0..W).for_each(|lane| rate[lane] += factor[lane] * times[lane]);
             }
-        }
-        slopes
+            rate
+        };
+        let of_states = (0..states).map(|k| *self.tape.output(k));
+        let of_slopes = self.rates.terms.iter().map(of_pair);
+        of_states.chain(of_slopes).collect()
     }
 }
 

@@ -14,15 +14,20 @@ use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect, Model
 /// parameter that the file declares fixed.
 pub fn candidates(problem: &Problem<'_>, present: &[FittedEffect]) -> Vec<FittedEffect> {
     let mut all: Vec<FittedEffect> = problem.declared.shifts();
-    all.extend(acting(problem, problem.effects()));
+    let effects = problem.effects().iter().filter(|effect| !effect.refines);
+    all.extend(acting(problem, effects));
     all.retain(|new| !present.iter().any(|old| old.excludes(new)));
     all
 }
 
 /// These effects on every joint where each can act and be observed.
-pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
+pub fn acting<'e>(
+    problem: &Problem<'_>,
+    effects: impl IntoIterator<Item = &'e Effect>,
+) -> Vec<FittedEffect> {
     let mut all = Vec::new();
-    let observable = effects.iter().filter(|effect| problem.shows(effect));
+    let observable = effects.into_iter();
+    let observable = observable.filter(|effect| problem.shows(effect));
     for effect in observable {
         for joint in Joint::all(problem.declared.joints) {
             if is_driven_enough(problem, effect, joint)
