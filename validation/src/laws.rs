@@ -79,6 +79,8 @@ fn ripple(n: &[f64], at: At) -> f64 {
 pub struct Law {
     numbers: Vec<f64>,
     formula: Formula,
+    /// Whether the speed changes it.
+    pub is_friction: bool,
 }
 
 impl Law {
@@ -94,21 +96,15 @@ impl Law {
         let entry = table.iter().find(|(name, ..)| *name == effect);
         let law = entry.map(|(_, names, formula)| {
             let numbers = names.iter().map(|name| number(name));
+            let numbers = numbers.collect::<Result<Vec<f64>, String>>()?;
+            let at = |v: f64| formula(&numbers, At { v, ..At::default() });
             Ok(Self {
-                numbers: numbers.collect::<Result<_, String>>()?,
+                is_friction: at(1.0) != at(0.0),
                 formula: *formula,
+                numbers,
             })
         });
         law.transpose()
-    }
-
-    /// Whether the speed changes it.
-    pub fn is_friction(&self) -> bool {
-        let at = |v: f64| {
-            let at = At { v, ..At::default() };
-            self.at(at)
-        };
-        at(1.0) != at(0.0)
     }
 
     /// Its torque \[N m\].

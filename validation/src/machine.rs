@@ -154,7 +154,7 @@ impl Machine {
                 load: balance.load[*j],
                 ..At::default()
             });
-            balance.free[*j] += match law.is_friction() {
+            balance.free[*j] += match law.is_friction {
                 true => torque * self.friction_left(*j, time),
                 false => torque,
             };

@@ -37,14 +37,9 @@ impl Program {
     pub fn inputs_read(&self) -> Vec<bool> {
         let mut read = vec![false; self.inputs.len()];
         let needed = needed(&self.ops, &self.outputs);
-        for op in self
-            .ops
-            .iter()
-            .zip(needed)
-            .filter_map(|(op, needed)| needed.then_some(op))
-        {
+        for (op, needed) in self.ops.iter().zip(needed) {
             if let Op::Input(input) = op {
-                read[*input as usize] = true;
+                read[*input as usize] |= needed;
             }
         }
         read

@@ -56,9 +56,9 @@ struct ActingIn {
 const FORGOTTEN: f64 = 30.0;
 
 impl Acting {
-    /// With the course of the internal states in each log, if there are any, and with the slopes of all of the model's filters
-    /// or of none. Logs of which no window is used give nothing, and rows
-    /// outside the windows of a log do not matter.
+    /// With the course of the internal states in each log, if there are any, and with the slopes of all of the model's
+    /// filters or of none. Logs of which no window is used give nothing, and rows outside the windows of a log do not
+    /// matter.
     pub fn of(
         dynamics: &Dynamics,
         values: &Values,

@@ -61,8 +61,8 @@ impl<const W: usize> Sensors<W> {
         &self.shown
     }
 
-    /// Replace the measured angles in `state` (`[state][lane]`) by those of the rig. Their difference is small, and is evaluated at the
-    /// measured angles.
+    /// Replace the measured angles in `state` (`[state][lane]`) by those of the rig. Their difference is small, and is
+    /// evaluated at the measured angles.
     pub fn correct(
         &mut self,
         state: &mut [Row<f64, W>],

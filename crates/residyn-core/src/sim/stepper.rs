@@ -36,8 +36,8 @@ impl<const W: usize> Stepper<W> {
         self.tape.inputs()[first + parameter][lane] = value;
     }
 
-    /// Advance `state` (`[state][lane]`: positions, velocities, then internal states) from `time` by `length` seconds in `substeps` equal
-    /// substeps. What is `given`, torques and then the model's further measured columns (`[channel][lane]`), holds over all
+    /// Advance `state` (`[state][lane]`: positions, velocities, then internal states) from `time` by `length` seconds in
+    /// `substeps` equal substeps. What is `given`, torques and then the model's further measured columns (`[channel][lane]`), holds over all
     /// of them or, if it differs between them, `[substep * channels + channel][lane]`.
     pub fn advance(
         &mut self,
