@@ -101,7 +101,7 @@ fn burn_differentiates_the_replay_as_we_do() {
         for (k, case) in cases().enumerate() {
             let mut points = points(&case.dynamics, ROWS, k as u64);
             // Parameters are shared by all rows, as in training: their gradient is the sum over the rows.
-            let states = 3 * case.dynamics.joints + 1;
+            let states = case.dynamics.layout().parameters();
             let parameters = points[0][states..].to_vec();
             points
                 .iter_mut()
@@ -116,7 +116,7 @@ fn burn_differentiates_the_replay_as_we_do() {
 fn check_burn(case: &Case, points: &[Vec<f64>], joint: usize, device: &Device) {
     let (n, inputs) = (case.dynamics.joints, points[0].len());
     let columns: Vec<Tensor<1>> = (0..inputs)
-        .map(|k| match k < 3 * n + 1 {
+        .map(|k| match k < case.dynamics.layout().parameters() {
             true => tensor(&column(points, k), device).require_grad(),
             false => tensor(&points[0][k..=k], device).require_grad(),
         })

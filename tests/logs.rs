@@ -557,7 +557,9 @@ mod slow {
         let cases = catalog(SignForm::Smooth { width: 0.01 });
         let mut called = Vec::new();
         for (case, seed) in cases.iter().zip(0..) {
-            let start = vec![0.4; case.dynamics.states()];
+            let (model, values) = (&case.dynamics, case.dynamics.values());
+            let motion = vec![0.4; 2 * model.joints];
+            let start = [motion, model.internal_starts(&values)].concat();
             let mut log = simulate(&case.dynamics, &start, 3.0, 1500, seed);
             log.path = case.name.clone().into();
             let runs_away = log.q.iter().flatten().any(|q| !(q.abs() < 1e3));

@@ -230,7 +230,7 @@ fn an_invalid_filter_is_refused_with_its_line() {
     let both = refused("confused_with", "force = \"-d\"\nconfused_with");
     assert!(
         both.contains(
-            "one of force, torque, angle, inertia, friction, command, reading, coupling and payload"
+            "one of force, torque, angle, inertia, friction, command, reading, coupling, payload and transmission"
         ),
         "{both}"
     );

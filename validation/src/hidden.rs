@@ -129,9 +129,20 @@ impl Machine {
             "actuator_delay" => drive.delay = n("d")?,
             "actuator_lag" => drive.lag = n("T")?,
             "backlash" => self.transmissions[j] = Some(Transmission::backlash(n("delta")?)),
-            "joint_compliance" => {
-                let (stiffness, inertia) = (n("k")?, n("J")?);
-                self.transmissions[j] = Some(Transmission::compliance(stiffness, inertia));
+            "joint_elasticity" => {
+                if n("friction")? > 0.0 {
+                    return Err(
+                        "`joint_elasticity`: friction acts on the link, so `friction` must be 0"
+                            .into(),
+                    );
+                }
+                self.transmissions[j] = Some(Transmission {
+                    play: 0.0,
+                    stiffness: n("k")?,
+                    damping: n("d")?,
+                    inertia: n("J_m")?,
+                    has_encoder: n("sensor")? > 0.5,
+                });
             }
             "encoder_eccentricity" => self.eccentricity[j] = [n("e_s")?, n("e_c")?],
             // A property of the sensor, not of the machine: each log draws its own.
@@ -308,16 +319,20 @@ mod tests {
     }
 
     #[test]
-    fn a_compliant_joint_carries_its_encoder_on_the_motor() {
-        let soft = [("k", 30.0), ("J", 0.01)];
-        for (name, values) in [
-            ("backlash", [("delta", 0.01)].as_slice()),
-            ("joint_compliance", &soft),
+    fn the_encoder_is_on_the_motor_or_on_the_link() {
+        let soft = |sensor: f64| {
+            let own = [("k", 30.0), ("d", 0.2), ("J_m", 0.01)];
+            [own.as_slice(), &[("sensor", sensor), ("friction", 0.0)]].concat()
+        };
+        for (name, values, read) in [
+            ("backlash", [("delta", 0.01)].as_slice(), 0.5),
+            ("joint_elasticity", &soft(1.0), 0.5),
+            ("joint_elasticity", &soft(0.0), 0.4),
         ] {
             let machine = Machine::bare(double_pendulum()).hiding(0, name, values);
             let mut state = State::at_rest([0.4, 0.3]);
             state.motor_q = [0.5, 0.6];
-            assert_eq!(machine.encoders(&state), [0.5, 0.3]);
+            assert_eq!(machine.encoders(&state), [read, 0.3]);
         }
     }
 

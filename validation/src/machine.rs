@@ -96,19 +96,21 @@ impl Machine {
         self.mechanics.joints()
     }
 
-    /// True values of declared parameters; on average, a motor behind a gear turns with its link.
+    /// True values of declared parameters; on average, a motor behind a gear with play turns with its link.
     pub fn declared(&self) -> BTreeMap<String, f64> {
-        let motor = self.transmissions[0].as_ref().map_or(0.0, |t| t.inertia);
+        let gear = self.transmissions[0].as_ref();
+        let motor = gear
+            .filter(|gear| gear.play > 0.0)
+            .map_or(0.0, |gear| gear.inertia);
         self.mechanics.declared(self.rotor[0] + motor)
     }
 
-    /// The encoder readings: angles of the motors if a transmission follows, else of the joints, read from discs that
-    /// may be off their axes.
+    /// The encoder readings: angles of the motors or of the joints, read from discs that may be off their axes.
     pub fn encoders(&self, state: &State) -> Pair {
         [0, 1].map(|j| {
-            let angle = match self.transmissions[j] {
-                Some(_) => state.motor_q[j],
-                None => state.q[j],
+            let angle = match &self.transmissions[j] {
+                Some(gear) if gear.has_encoder => state.motor_q[j],
+                _ => state.q[j],
             };
             let [by_sine, by_cosine] = self.eccentricity[j];
             angle + by_sine * angle.sin() + by_cosine * angle.cos()

@@ -1,5 +1,5 @@
-/// The transmission between a motor, which has its own inertia and carries the encoder, and the link: a spring-damper
-/// with play. Stiff with play, it is backlash; soft without play, it is joint compliance.
+/// The transmission between a motor, which has its own inertia, and the link: a spring-damper with play. Stiff with play,
+/// it is backlash; soft without play, it is an elastic joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transmission {
     /// Free angle between the two contacts \[rad\].
@@ -10,6 +10,8 @@ pub struct Transmission {
     pub damping: f64,
     /// Inertia of the motor, reflected to the joint \[kg m^2\].
     pub inertia: f64,
+    /// Whether the encoder is on the motor, not on the link.
+    pub has_encoder: bool,
 }
 
 /// Contact stiffness of a gear: half a milliradian under 1 N m.
@@ -22,20 +24,12 @@ const ROTOR_INERTIA: f64 = 0.002;
 impl Transmission {
     /// Two-sided play of `play` rad.
     pub fn backlash(play: f64) -> Self {
-        Self::new(play, CONTACT_STIFFNESS, ROTOR_INERTIA)
-    }
-
-    /// A soft shaft.
-    pub fn compliance(stiffness: f64, inertia: f64) -> Self {
-        Self::new(0.0, stiffness, inertia)
-    }
-
-    fn new(play: f64, stiffness: f64, inertia: f64) -> Self {
         Self {
             play,
-            stiffness,
-            damping: 2.0 * DAMPING_RATIO * (stiffness * inertia).sqrt(),
-            inertia,
+            stiffness: CONTACT_STIFFNESS,
+            damping: 2.0 * DAMPING_RATIO * (CONTACT_STIFFNESS * ROTOR_INERTIA).sqrt(),
+            inertia: ROTOR_INERTIA,
+            has_encoder: true,
         }
     }
 
@@ -70,8 +64,15 @@ mod tests {
 
     #[test]
     fn a_soft_shaft_is_a_spring_in_both_directions() {
-        let shaft = Transmission::compliance(30.0, 0.01);
+        let shaft = Transmission {
+            play: 0.0,
+            stiffness: 30.0,
+            damping: 0.2,
+            inertia: 0.01,
+            has_encoder: true,
+        };
         assert!((shaft.torque(0.1, 0.0) - 3.0).abs() < 1e-12);
+        assert!((shaft.torque(0.1, -1.0) - 2.8).abs() < 1e-12);
         assert!((shaft.torque(-0.1, 0.0) + 3.0).abs() < 1e-12);
     }
 }

@@ -28,12 +28,13 @@ impl Problem<'_> {
 impl ErrorModel {
     /// Whether these errors can show an effect. Torques are computed from the motion as it was read, and the torque
     /// that acts must determine the command: an effect that explains any command would always fit. A limit explains large
-    /// ones only, if it is known what the law asks for.
+    /// ones only, if it is known what the law asks for. The swing of a motor against its link is faster than torques are
+    /// compared.
     fn shows(self, effect: &Effect, declared: &Model) -> bool {
         match self {
             Self::OutputError => effect.shows_in == ShowsIn::Any,
             Self::InverseDynamics => {
-                !matches!(effect.entry, Entry::Reading(_))
+                !matches!(effect.entry, Entry::Reading(_) | Entry::Transmission(_))
                     && (effect.distinguishes_command()
                         || declared.knows_law() && effect.limits_command())
                     && (effect.shows_in != ShowsIn::LawTorques

@@ -51,6 +51,7 @@ pub(super) fn noted(
     report_too_many(problem, &mut of_train);
     report_measured(problem, &mut of_train);
     report_drive_gain(problem.declared, &refined.after.model, &mut of_train);
+    report_held(&refined.after.model, &mut of_train);
     report_scale(problem, &found.chosen.after, &mut of_train);
     report_scaled_limbs(problem, &refined.after.model, &mut of_train);
     // Logs on which the model diverges cannot show external forces.
@@ -69,6 +70,26 @@ pub(super) fn noted(
         audits,
         fitted_tests,
         pushed,
+    }
+}
+
+/// Report in the first log's audit which values of effects are assumed, since the logs do not determine them.
+fn report_held(fitted: &Model, audits: &mut [Audit]) {
+    let parameters = fitted.all_parameters();
+    for (k, effect) in fitted.effects.iter().enumerate() {
+        let (Some(held), Some(audit)) = (effect.effect.held(), audits.first_mut()) else {
+            continue;
+        };
+        let assumed = &parameters[fitted.place_of(k)][held];
+        let text = format!(
+            "{} = {:.3} {} of {} is assumed: the logs do not determine it, and its other values and the inertia of the \
+             joint are those that go with it",
+            assumed.name,
+            assumed.value,
+            assumed.unit,
+            effect.label()
+        );
+        audit.add(Finding::new(Severity::Warning, text));
     }
 }
 

@@ -36,6 +36,8 @@ pub struct Problem<'a> {
     pub top_speed: Vec<f64>,
     pub top_torque: Vec<f64>,
     pub top_driving: Vec<f64>,
+    /// What the declared equations give each joint, kg m^2 or kg.
+    pub(super) inertias: Vec<f64>,
     pub shooting: Shooting<'a>,
     /// A few of its windows, spread evenly, for comparing starting points.
     pub sample: Sample<'a>,
@@ -143,6 +145,7 @@ impl<'a> Problem<'a> {
             top_speed,
             top_torque,
             top_driving,
+            inertias: declared.joint_inertias(),
             first: None,
             usual: Arc::default(),
             moved_to: Vec::new(),
@@ -173,12 +176,17 @@ impl<'a> Problem<'a> {
     /// An effect with bounds and starting values in a joint's own units.
     pub fn measured(&self, effect: &Effect, joint: Joint) -> Effect {
         let durations = self.logs.iter().map(Log::duration);
-        effect.measured_by(&Logged {
+        let measured = effect.measured_by(&Logged {
             reversal: self.smoothing_velocities[joint],
             top_speed: self.top_speed[joint],
             top_torque: self.top_torque[joint],
+            inertia: self.inertias[joint],
             duration_s: durations.fold(0.0, f64::max),
-        })
+        });
+        match &self.declared.sides {
+            Some(sides) => measured.read_on(sides[joint]),
+            None => measured,
+        }
     }
 
     /// The effects that the model may lack.

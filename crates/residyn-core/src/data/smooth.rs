@@ -209,9 +209,9 @@ impl Smoothing {
     }
 
     /// Channels with values at the rows of a stretch of the log, in the same way.
-    pub fn sampled_in(&self, stretch: &Stretch, channels: &[&[f64]]) -> Vec<Vec<f64>> {
+    pub fn sampled_in(&self, stretch: &Stretch, channels: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let mean = |pair: &[f64]| 0.5 * (pair[0] + pair[1]);
-        let means = |channel: &&[f64]| -> Vec<f64> {
+        let means = |channel: &Vec<f64>| -> Vec<f64> {
             let steps = channel.windows(2).map(mean);
             steps.chain(channel.last().copied()).collect()
         };

@@ -1,6 +1,6 @@
 //! The torques that logged motions need, compared with those that act: windows of smoothed logs, one per lane.
 
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 use super::normal_equations::{Reduced, WindowTerms};
 use super::sensitivity::{LANES, Tangent};
@@ -29,7 +29,7 @@ impl Rows {
     }
 
     /// The rows within a window.
-    pub fn within(&self, log: &Log, window: &Window) -> std::ops::Range<usize> {
+    pub fn within(&self, log: &Log, window: &Window) -> Range<usize> {
         let at = |row: usize| row_from(&self.smooth.time, log.time[row]);
         at(window.first)..at(window.last)
     }
@@ -114,16 +114,15 @@ impl Rows {
         });
         let slopes: Vec<Vec<f64>> = slopes.collect();
         let given = tau.into_iter().chain(measured.into_iter().cloned());
-        let along = |of: fn(&Course) -> &[Vec<f64>]| {
-            let channels = course.map_or(&[][..], of).iter();
-            let channels = channels.map(|channel| &channel[stretch.logged.clone()]);
-            smoothing.sampled_in(&stretch, &channels.collect::<Vec<_>>())
+        let along = |of: fn(&Course, Range<usize>) -> Vec<Vec<f64>>| {
+            let channels = course.map(|course| of(course, stretch.logged.clone()));
+            smoothing.sampled_in(&stretch, &channels.unwrap_or_default())
         };
         let by_filters = smoothing.held_in(&stretch, &slopes);
         ActingIn {
-            internal: along(|course| &course.values),
+            internal: along(Course::states),
             given: given.collect(),
-            slopes: [by_filters, along(|course| &course.slopes)].concat(),
+            slopes: [by_filters, along(Course::slopes)].concat(),
         }
     }
 }

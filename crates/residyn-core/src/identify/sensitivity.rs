@@ -45,6 +45,8 @@ pub(super) struct Tangent {
     pub active: Vec<usize>,
     /// The derivatives of each internal state's rate that are not zero.
     internal_rows: Vec<InternalRow>,
+    /// Those of each acceleration with respect to internal states at the step's start.
+    accelerations_by_start: Vec<Vec<(usize, usize)>>,
     /// For a torque balance, the columns that each joint's difference depends on; else empty.
     pub columns_of: Vec<Vec<usize>>,
     /// Number of free values of one window.
@@ -87,12 +89,14 @@ impl Tangent {
         let Compiled {
             program,
             internal_rows,
+            accelerations_by_start,
             columns_of,
         } = compiled;
         Self {
             program,
             reading,
             internal_rows,
+            accelerations_by_start,
             internal,
             joints: n,
             layout,
@@ -160,6 +164,7 @@ impl Tangent {
 struct Compiled {
     program: Program,
     internal_rows: Vec<InternalRow>,
+    accelerations_by_start: Vec<Vec<(usize, usize)>>,
     columns_of: Vec<Vec<usize>>,
 }
 
@@ -253,8 +258,8 @@ impl<'d> Differentiated<'d> {
         let by_states = of_joints.iter().flat_map(|row| &row[states.clone()]);
         let others = states.end..states.end + active.len() + forces.len();
         let others = others.flat_map(|k| jacobian.iter().map(move |row| &row[k]));
-        let rates = &slopes[self.dynamics.joints..];
-        let of_starts = self.graph.jacobian(rates, &self.inputs[layout.starts()]);
+        let of_starts = (self.graph).jacobian(&slopes, &self.inputs[layout.starts()]);
+        let (joints_by_start, internal_by_start) = of_starts.split_at(self.dynamics.joints);
         let all = slopes.iter().chain(by_states).chain(others);
         let mut all: Vec<Node> = all.copied().collect();
         let mut placed = |row: &[Node], first: usize| {
@@ -267,13 +272,18 @@ impl<'d> Differentiated<'d> {
             }
             places
         };
-        let rows = of_internal.iter().zip(&of_starts);
+        let rows = of_internal.iter().zip(internal_by_start);
         let internal_rows = rows.map(|(by_state, by_start)| InternalRow {
             by_state: placed(&by_state[states.clone()], 0),
             by_start: placed(by_start, layout.internal().start),
         });
+        let internal_rows = internal_rows.collect();
+        let of_joints = joints_by_start.iter();
         Compiled {
-            internal_rows: internal_rows.collect(),
+            internal_rows,
+            accelerations_by_start: of_joints
+                .map(|by_start| placed(by_start, layout.internal().start))
+                .collect(),
             program: self.graph.finish(&all),
             columns_of: Vec::new(),
         }
@@ -296,6 +306,7 @@ impl<'d> Differentiated<'d> {
         Compiled {
             program: self.graph.finish(&outputs),
             internal_rows: Vec::new(),
+            accelerations_by_start: Vec::new(),
             columns_of,
         }
     }
@@ -583,6 +594,13 @@ impl<'t> TangentStepper<'t> {
                                 let by_state = by_state[(row - n) * rows + state].get(simd, part);
                                 slope = by_state.mul_add(inner[state].get(simd, part), slope);
                             }
+                            if internal > 0 {
+                                for (state, output) in &self.tangent.accelerations_by_start[row - n]
+                                {
+                                    let by = self.tape.output(*output).get(simd, part);
+                                    slope = by.mul_add(now[*state].get(simd, part), slope);
+                                }
+                            }
                         } else if column > 0 {
                             let InternalRow { by_state, by_start } =
                                 &self.tangent.internal_rows[row - 2 * n];
@@ -644,7 +662,7 @@ mod tests {
     use super::{LANES, Local, Tangent, TangentStepper};
     use crate::data::Joint;
     use crate::lanes::Row;
-    use crate::model::{Dependence, Dynamics, FittedEffect, Library};
+    use crate::model::{Dependence, Dynamics, FittedEffect, Library, elastic, viscous};
     use crate::sim::bristles;
     use crate::sim::{Commands, Hold, InternalStart, Point, RK4, SCHEMES, Scheme, Simulator};
 
@@ -736,6 +754,23 @@ mod tests {
         assert_eq!(model.states(), 8);
         for scheme in SCHEMES {
             are_slopes(&model, [0.7, -0.4, 1.5, -2.0], 20, scheme);
+        }
+    }
+
+    #[test]
+    fn sensitivities_of_elastic_joints_are_the_slopes_of_every_schemes_steps() {
+        let acrobot = Library::built_in().model("acrobot").unwrap();
+        for sides in [[0.0, 1.0], [1.0, 0.0]] {
+            let model = acrobot.with_effects(vec![
+                viscous(Joint::at(0)),
+                elastic(Joint::at(0), sides),
+                elastic(Joint::at(1), sides),
+            ]);
+            let model = model.dynamics();
+            assert_eq!(model.states(), 8);
+            for scheme in SCHEMES {
+                are_slopes(&model, [0.7, -0.4, 1.5, -2.0], 20, scheme);
+            }
         }
     }
 

@@ -457,7 +457,7 @@ mod tests {
     use crate::data::{Joint, Log};
     use crate::identify::sensitivity::{Local, Tangent};
     use crate::identify::{cut, free_parameters};
-    use crate::model::{Dynamics, FittedEffect, Library};
+    use crate::model::{Dynamics, FittedEffect, Library, Model, elastic};
     use crate::sim::bristles;
 
     /// Two seconds of an arbitrary motion and torque at 100 Hz.
@@ -588,7 +588,16 @@ mod tests {
         let mut delay = FittedEffect::absent(delay, Joint::at(0));
         delay.values[0].0 = 0.0073;
         let arm = library.model("acrobot").unwrap();
-        let model = arm.with_effects(vec![bristles(Joint::at(0)), delay]);
+        for sides in [None, Some([0.0, 1.0]), Some([1.0, 0.0])] {
+            let elastic = sides.map(|sides| elastic(Joint::at(1), sides));
+            let effects = [bristles(Joint::at(0)), delay.clone()]
+                .into_iter()
+                .chain(elastic);
+            gradients_are_slopes(&arm.with_effects(effects.collect()));
+        }
+    }
+
+    fn gradients_are_slopes(model: &Model) {
         let (motion, torques) = (model.dynamics(), model.smoothed_torque_balance().unwrap());
         let mut log = two_joints();
         log.q[0].iter_mut().for_each(|q| *q *= 20.0);

@@ -1,5 +1,10 @@
+mod transmission;
+#[cfg(test)]
+pub(crate) use transmission::tests::{elastic, viscous};
+
 use std::ops::Range;
 
+use self::transmission::Motor;
 use super::dynamics::{Dynamics, Parameter, PerLogValue};
 use super::effect::{Effect, Entry, PLACE, RATIO};
 use super::filter::Filter;
@@ -7,7 +12,7 @@ use super::fitted::FittedEffect;
 use super::internal_state::{InternalStates, mean_rates};
 use super::reader::Located;
 use super::system::{Model, Motion};
-use crate::data::{Joint, Quantity};
+use crate::data::{Joint, NOMINAL, Quantity};
 use crate::expr::{Formula, Graph, Node, Op, Program, Scope, SignForm};
 
 impl Model {
@@ -19,7 +24,7 @@ impl Model {
         let sign = self.sign();
         let (mut assembly, reading) = self.driven(&sign);
         let accelerations = assembly.accelerations();
-        let outputs = [&assembly.qd, &accelerations, &assembly.rates].map(Vec::as_slice);
+        let outputs = [&assembly.shown_qd, &accelerations, &assembly.rates].map(Vec::as_slice);
         let program = self.of_a_step(assembly.graph.finish(&outputs.concat()));
         Dynamics {
             reading: reading.map(|reading| self.of_a_step(reading)),
@@ -35,6 +40,7 @@ impl Model {
         let reading = assembly.reading();
         assembly.apply_sensors();
         assembly.apply_torque_effects();
+        assembly.apply_transmissions();
         assembly.apply_forces();
         (assembly, reading)
     }
@@ -46,11 +52,18 @@ impl Model {
             return None;
         }
         let sign = self.sign();
-        let (Assembly { graph, rates, .. }, _) = self.driven(&sign);
-        let rates = self.of_a_step(graph.finish(&rates));
+        let (mut assembly, _) = self.driven(&sign);
+        if !assembly.motors.is_empty() {
+            assembly.accelerations();
+        }
+        let rates = self.of_a_step(assembly.graph.finish(&assembly.rates));
         let programs = [rates, self.internal_starts()];
+        let settled = self.effects.iter().flat_map(|effect| {
+            let states = effect.effect.states.iter();
+            states.map(|_| effect.effect.is_transmission())
+        });
         Some(InternalStates::new(
-            names,
+            (names, settled.collect()),
             programs,
             self.layout(),
             &self.filters(),
@@ -155,8 +168,9 @@ impl Model {
         let commanded = assembly.tau.clone();
         assembly.apply_sensors();
         assembly.apply_torque_effects();
+        assembly.apply_transmissions();
         assembly.apply_forces();
-        let needed = assembly.torques(qdd)?;
+        let needed = assembly.torques_of_shown(qdd)?;
         let mut graph = assembly.graph;
         let one = graph.constant(1.0);
         let difference = |j: usize| {
@@ -193,6 +207,24 @@ impl Model {
         assembly.apply_sensors();
         let (matrix, bias) = assembly.mass_and_bias()?;
         Some(assembly.graph.finish(&[matrix.concat(), bias].concat()))
+    }
+
+    /// The inertia that each joint has for its torque while the others are free (kg m^2 or kg), from the declared equations
+    /// at rest with all angles at zero.
+    pub fn joint_inertias(&self) -> Vec<f64> {
+        let sign = self.sign();
+        let mut assembly = Assembly::new(self, &[], &sign);
+        assembly.apply_drive();
+        let accelerations = assembly.accelerations();
+        let mobility = Joint::all(self.joints)
+            .map(|joint| assembly.mobility(joint, accelerations[joint]))
+            .collect::<Vec<Node>>();
+        let program = assembly.graph.finish(&mobility);
+        let layout = self.layout();
+        let mut inputs = vec![0.0; layout.time() + 1];
+        inputs[layout.driving().end..layout.time()].fill(NOMINAL);
+        inputs.extend(self.values());
+        program.eval(&inputs).into_iter().map(f64::recip).collect()
     }
 
     /// Every parameter of the model: the declared ones, then those of the effects, in their order.
@@ -254,6 +286,18 @@ struct Placed<'a> {
     states: Range<usize>,
 }
 
+impl Placed<'_> {
+    /// The value of a parameter that the effect needs by name.
+    fn value(&self, name: &str) -> f64 {
+        self.effect.values[self.place(name)].0
+    }
+
+    fn place(&self, name: &str) -> usize {
+        let place = self.effect.effect.names().position(|own| own == name);
+        place.expect("checked when the file was read")
+    }
+}
+
 /// A step that begins: the internal states at its start, and its length.
 struct Step {
     starts: Vec<Node>,
@@ -266,9 +310,13 @@ struct Assembly<'a> {
     effects: Vec<Placed<'a>>,
     sign: &'a [SignForm],
     graph: Graph,
-    /// The angle of the rig, once sensors are accounted for.
+    /// The angle of the rig, once sensors are accounted for; of the links, once transmissions are applied.
     q: Vec<Node>,
     qd: Vec<Node>,
+    /// The speeds that the sensors show.
+    shown_qd: Vec<Node>,
+    /// The motors behind transmissions.
+    motors: Vec<Motor>,
     /// The internal states of all effects, in their order.
     internal: Vec<Node>,
     /// None where the internal states are given.
@@ -330,7 +378,9 @@ impl<'a> Assembly<'a> {
             sign,
             graph,
             q,
+            shown_qd: qd.clone(),
             qd,
+            motors: Vec::new(),
             internal,
             step: None,
             rates: Vec::new(),
@@ -379,7 +429,7 @@ impl<'a> Assembly<'a> {
     }
 
     fn give_directions(&self, scope: &mut Scope) {
-        for (qd, direction) in self.qd.iter().zip(&self.directions) {
+        for (qd, direction) in self.shown_qd.iter().zip(&self.directions) {
             scope.give_sign(*qd, *direction);
         }
     }
@@ -429,7 +479,7 @@ impl<'a> Assembly<'a> {
                     force = self.graph.mul(force, *share);
                 }
             }
-            self.tau[joint] = self.graph.add(self.tau[joint], force);
+            self.add_force(joint, force, is_friction);
         }
         for coupling in self.couplings() {
             for (joint, share) in coupling.shares {
@@ -454,11 +504,8 @@ impl<'a> Assembly<'a> {
 
     /// A parameter that the effect needs by name.
     fn parameter(&self, index: usize, name: &str) -> Node {
-        let Placed {
-            effect, parameters, ..
-        } = &self.effects[index];
-        let k = effect.effect.names().position(|own| own == name);
-        parameters[k.expect("checked when the file was read")]
+        let placed = &self.effects[index];
+        placed.parameters[placed.place(name)]
     }
 
     /// The effects on sums of two joints.
@@ -533,8 +580,12 @@ impl<'a> Assembly<'a> {
         } = &self.effects[index];
         let joint = effect.joint;
         let mut scope = Scope::new(self.sign[joint]);
-        scope.bind("q", self.q[joint]);
-        scope.bind("qd", self.qd[joint]);
+        let mut motors = self.motors.iter();
+        let motor = motors.find(|motor| motor.joint == joint && motor.has_friction);
+        let of_motor = motor.filter(|_| effect.effect.is_friction());
+        let [q, qd] = of_motor.map_or([self.q[joint], self.qd[joint]], |motor| motor.motion);
+        scope.bind("q", q);
+        scope.bind("qd", qd);
         scope.bind("tau", self.tau[joint]);
         scope.bind("load", self.tau[joint]);
         self.bind_given(&mut scope);
@@ -550,12 +601,27 @@ impl<'a> Assembly<'a> {
     }
 
     fn accelerations(&mut self) -> Vec<Node> {
+        let of_links = self.accelerations_of_links();
+        match self.motors.is_empty() {
+            true => of_links,
+            false => self.accelerations_of_shown(&of_links),
+        }
+    }
+
+    fn accelerations_of_links(&mut self) -> Vec<Node> {
         if let Motion::Accelerations(formulas) = &self.system.equations.motion {
             let scope = self.declared_scope();
             return self.lowered(&scope, formulas);
         }
         let (matrix, bias) = self.mass_and_bias().expect("all other models have both");
         self.solved(&matrix, &bias)
+    }
+
+    /// How much a joint accelerates for each N m of its torque.
+    fn mobility(&mut self, joint: Joint, acceleration: Node) -> Node {
+        let one = self.graph.constant(1.0);
+        let torque = self.tau[joint];
+        self.graph.gradient(&[acceleration], &[one], &[torque])[0]
     }
 
     /// Mass matrix and bias, inertia of effects included; `None` for a model that gives accelerations.

@@ -15,6 +15,12 @@ pub const EFFECT_NAMES: [&str; 5] = ["q", "qd", "tau", "load", "t"];
 pub(super) const COUPLING_NAMES: [&str; 4] = ["q", "qd", "qdd", "t"];
 pub(super) const RATIO: &str = "r";
 
+/// Names that the formula of a transmission may mention: by what the motor leads the link, and how fast that grows.
+pub(super) const TRANSMISSION_NAMES: [&str; 3] = ["twist", "twist_rate", "t"];
+/// The inertia of the motor behind a transmission, and whether sensor and friction are on its side (1) or the link's (0).
+pub(super) const MOTOR_INERTIA: &str = "J_m";
+pub(super) const SIDES: [&str; 2] = ["sensor", "friction"];
+
 /// The position of a payload: parameters with these names.
 pub(super) const PLACE: [&str; 3] = ["x", "y", "z"];
 
@@ -96,6 +102,13 @@ pub enum AlikeOn {
     Commanded,
 }
 
+/// The two sides of a transmission.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    Link,
+    Motor,
+}
+
 /// How an effect enters the equations of its joint. Formulas are in `q`, `qd`, `tau`, `load`, `t` of that joint and in
 /// the effect's parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,6 +135,9 @@ pub enum Entry {
     Coupling(Formula),
     /// A point mass on the last body of a chain, at the parameters x, y, z in that body's frame.
     Payload(Formula),
+    /// The torque that passes from a motor with an inertia of its own to the link. The motor's torque is that after all
+    /// effects on the torque; the parameters of [`SIDES`] say on which side the sensor and friction are.
+    Transmission(Formula),
 }
 
 impl Entry {
@@ -129,6 +145,7 @@ impl Entry {
     pub(super) fn names(&self) -> &'static [&'static str] {
         match self {
             Self::Coupling(_) => &COUPLING_NAMES,
+            Self::Transmission(_) => &TRANSMISSION_NAMES,
             Self::Payload(_) => &[],
             _ => &EFFECT_NAMES,
         }
@@ -143,6 +160,7 @@ impl Entry {
     pub(crate) fn needed(&self) -> &'static [&'static str] {
         match self {
             Self::Coupling(_) => &[RATIO],
+            Self::Transmission(_) => &[MOTOR_INERTIA, SIDES[0], SIDES[1]],
             Self::Payload(_) => &PLACE,
             _ => &[],
         }
@@ -159,6 +177,7 @@ impl Entry {
             | Self::Shift(_, f)
             | Self::Reading(f)
             | Self::Coupling(f)
+            | Self::Transmission(f)
             | Self::Payload(f) => Ok(f),
             Self::Command(filter) => Err(*filter),
         }
@@ -187,6 +206,8 @@ pub enum Measure {
     Speed,
     /// The highest torque of the joint in the logs.
     Torque,
+    /// The inertia that the declared equations give the joint.
+    Inertia,
     /// The longest log.
     Duration,
 }
@@ -200,6 +221,8 @@ pub struct Logged {
     pub top_speed: f64,
     /// The highest torque, N m or N.
     pub top_torque: f64,
+    /// The inertia in the declared equations, kg m^2 or kg.
+    pub inertia: f64,
     /// The length of the longest log, s.
     pub duration_s: f64,
 }
@@ -222,9 +245,42 @@ pub struct EffectParameter {
     pub whole: bool,
     /// Takes a separate value in each log.
     pub per_log: bool,
+    pub hold: Hold,
+}
+
+/// Whether fits hold a parameter where they start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hold {
+    Never,
+    /// If the logs do not determine it: it says how the others are to be read, and any value explains the logs.
+    IfUnknown,
+    /// As they do not.
+    Held,
 }
 
 impl Effect {
+    /// The same effect with what logs need not determine held; `None` if there is nothing of the kind.
+    pub(crate) fn with_unknown_held(&self) -> Option<Self> {
+        let mut held = self.clone();
+        let mut unknown = held.parameters.iter_mut();
+        let unknown = unknown.find(|parameter| parameter.hold == Hold::IfUnknown)?;
+        unknown.hold = Hold::Held;
+        Some(held)
+    }
+
+    /// Free what was held: beside other effects logs may determine it.
+    pub(crate) fn free_held(&mut self) {
+        if let Some(held) = self.held() {
+            self.parameters[held].hold = Hold::IfUnknown;
+        }
+    }
+
+    /// The parameter that is held since the logs do not determine it, by its place.
+    pub fn held(&self) -> Option<usize> {
+        let mut parameters = self.parameters.iter();
+        parameters.position(|parameter| parameter.hold == Hold::Held)
+    }
+
     /// The names of its parameters.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.parameters
@@ -248,7 +304,8 @@ impl Effect {
     /// Whether the effect is invisible on a joint without torque.
     pub fn needs_torque(&self) -> bool {
         let names = self.mentions();
-        self.is_filter() || ["tau", "load"].iter().any(|name| names.contains(name))
+        let reads = |name: &&str| names.contains(*name);
+        self.is_filter() || self.is_transmission() || ["tau", "load"].iter().any(reads)
     }
 
     /// Whether one of two effects is listed as easily confused with the other.
@@ -264,6 +321,26 @@ impl Effect {
     /// Whether the effect delays commands or low-passes them.
     pub fn is_filter(&self) -> bool {
         matches!(self.entry, Entry::Command(_))
+    }
+
+    /// The same effect with the sensor of its joint on this side, if that matters to it.
+    #[must_use]
+    pub(crate) fn read_on(mut self, side: Side) -> Self {
+        if self.is_transmission() {
+            let mut parameters = self.parameters.iter_mut();
+            let sensor = parameters.find(|parameter| parameter.name == SIDES[0]);
+            let value = match side {
+                Side::Link => 0.0,
+                Side::Motor => 1.0,
+            };
+            sensor.expect("checked when the file was read").starts = vec![value];
+        }
+        self
+    }
+
+    /// Whether the effect stands between a motor and its link.
+    pub fn is_transmission(&self) -> bool {
+        matches!(self.entry, Entry::Transmission(_))
     }
 
     /// Whether the effect couples its joint with the next one.
@@ -352,6 +429,7 @@ impl Effect {
                 Measure::One => (None, 1.0),
                 Measure::Speed => (Some(slowest), logged.top_speed),
                 Measure::Torque => (None, logged.top_torque),
+                Measure::Inertia => (None, logged.inertia),
                 Measure::Duration => (None, logged.duration_s),
             };
             let multiples = parameter.bounds.iter_mut().chain(&mut parameter.starts);
@@ -468,7 +546,9 @@ impl Effect {
     /// its parameters do the same. Where they do not, the values of like joints on opposite sides differ in sign or swap.
     pub fn is_mirror_symmetric(&self) -> bool {
         let (formula, sign) = match &self.entry {
-            Entry::Force(formula) | Entry::Torque(formula) => (formula, -1.0),
+            Entry::Force(formula) | Entry::Torque(formula) | Entry::Transmission(formula) => {
+                (formula, -1.0)
+            }
             Entry::Inertia(formula) | Entry::Friction(formula) => (formula, 1.0),
             Entry::Command(_) => return true,
             _ => return false,
@@ -603,6 +683,7 @@ mod tests {
                 reversal,
                 top_speed: 10.0,
                 top_torque: 1.0,
+                inertia: 0.1,
                 duration_s: 20.0,
             });
             let mut parameters = measured.parameters.into_iter();

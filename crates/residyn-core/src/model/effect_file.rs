@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::str::FromStr;
 
-use super::effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
+use super::effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Hold, Measure};
 use super::internal_state::InternalState;
 use super::reader::{Document, FileError, Located, Section};
 use super::sections;
@@ -12,8 +12,7 @@ use super::values::Named;
 use crate::data::is_measured;
 use crate::expr::{Formula, parse};
 
-const ONE_WAY: &str =
-    "one of force, torque, angle, inertia, friction, command, reading, coupling and payload";
+const ONE_WAY: &str = "one of force, torque, angle, inertia, friction, command, reading, coupling, payload and transmission";
 
 impl Effect {
     /// The effect in `text`; `path` is for messages.
@@ -33,7 +32,10 @@ impl Effect {
         let parameters = parameters.collect::<Result<Vec<_>, _>>()?;
         let names_of_states: Vec<&str> = states.iter().map(|(name, _)| name.as_str()).collect();
         let entry = entry(&mut table, &parameters, &names_of_states)?;
-        let states = internal_states(states, &entry, &parameters)?;
+        let mut states = internal_states(states, &entry, &parameters)?;
+        if let Entry::Transmission(_) = entry {
+            states = InternalState::of_transmission().to_vec();
+        }
         if let Some(condition) = &table.valid_if {
             (table.section).check_names("valid_if", &condition.value, names(&parameters))?;
         }
@@ -76,7 +78,7 @@ fn entry(
     states: &[&str],
 ) -> Result<Entry, FileError> {
     type Make = fn(Formula) -> Entry;
-    let formulas: [(&str, Option<Located<Formula>>, Make); 8] = [
+    let formulas: [(&str, Option<Located<Formula>>, Make); 9] = [
         ("force", table.force.take(), Entry::Force),
         ("torque", table.torque.take(), Entry::Torque),
         ("angle", table.angle.take(), Entry::Angle),
@@ -85,6 +87,11 @@ fn entry(
         ("reading", table.reading.take(), Entry::Reading),
         ("coupling", table.coupling.take(), Entry::Coupling),
         ("payload", table.payload.take(), Entry::Payload),
+        (
+            "transmission",
+            table.transmission.take(),
+            Entry::Transmission,
+        ),
     ];
     let section = &table.section;
     let filter = table.command.map(|kind| ("command", Entry::Command(kind)));
@@ -155,7 +162,7 @@ fn internal_states(
             name,
             unit: table.unit,
             about: table.about.unwrap_or_default(),
-            rate: table.rate.value,
+            rate: Some(table.rate.value),
             start: table.start.map(|start| start.value),
             within: table.within.map(|ends| ends.map(|end| end.value)),
         })
@@ -193,6 +200,10 @@ fn parameter(
         measure: table.relative_to.unwrap_or(Measure::One),
         whole: table.whole,
         per_log: table.per.is_some(),
+        hold: match table.held_if_unknown {
+            true => Hold::IfUnknown,
+            false => Hold::Never,
+        },
     })
 }
 

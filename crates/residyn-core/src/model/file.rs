@@ -96,6 +96,7 @@ impl Model {
             parameters,
             effects,
             hidden: sections::hidden(file.residual, joints)?,
+            sides: sections::sides(file.sensors, joints)?,
             text: document.text.clone(),
             places,
             declaration: sections::declaration(document)?,

@@ -3,7 +3,7 @@
 use super::Parameter;
 use super::assemble::lower;
 use super::dynamics::PerLogValue;
-use super::effect::{Effect, Entry, Measure, RATIO};
+use super::effect::{Effect, Entry, Hold, Measure, RATIO};
 use super::filter::CommandFilter;
 use crate::data::{Joint, Quantity};
 use crate::expr::{Graph, Program, Scope, SignForm};
@@ -55,6 +55,15 @@ impl FittedEffect {
         }
     }
 
+    /// The same effect with what the logs need not determine held where fits start; `None` if there is nothing of the kind.
+    pub(crate) fn with_unknown_held(&self) -> Option<Self> {
+        let effect = self.effect.with_unknown_held()?;
+        let held = effect.held()?;
+        let mut fitted = self.clone();
+        fitted.values[held] = (effect.parameters[held].starts[0], None);
+        Some(Self { effect, ..fitted })
+    }
+
     /// By what it multiplies every command, if it is a gain.
     pub(crate) fn gain(&self) -> Option<f64> {
         let values: Vec<f64> = self.values.iter().map(|(value, _)| *value).collect();
@@ -82,11 +91,13 @@ impl FittedEffect {
         [self.joint].into_iter().chain(next).collect()
     }
 
-    /// Whether the two cannot act in one model: they are the same effect, or filters of one kind on one joint.
+    /// Whether the two cannot act in one model: they are the same effect, filters of one kind on one joint, or
+    /// transmissions of one joint.
     pub fn excludes(&self, other: &Self) -> bool {
         let filter = matches!(self.effect.entry, Entry::Command(_));
         let same_filter = filter && self.effect.entry == other.effect.entry;
-        self.is_same(other) || same_filter && self.joint == other.joint
+        let transmissions = self.effect.is_transmission() && other.effect.is_transmission();
+        self.is_same(other) || (same_filter || transmissions) && self.joint == other.joint
     }
 
     /// Whether the two are one effect on one joint, whatever their values.
@@ -123,7 +134,8 @@ impl FittedEffect {
     /// program.
     pub(super) fn printed_states(&self) -> impl Iterator<Item = (String, [usize; 3])> {
         let states = self.effect.states.iter().enumerate();
-        states.map(|(k, state)| (self.joint.name(&state.name), [1, 2, 3].map(|of| 3 * k + of)))
+        let printed = states.filter(|(_, state)| state.rate.is_some());
+        printed.map(|(k, state)| (self.joint.name(&state.name), [1, 2, 3].map(|of| 3 * k + of)))
     }
 
     /// The effect's formula as a program, followed by the rate of each of its states and the ends of the state's range,
@@ -147,6 +159,7 @@ impl FittedEffect {
         for stem in self.effect.entry.names() {
             let node = match (*stem, scope.get(RATIO)) {
                 ("t", _) => graph.input("t"),
+                _ if scope.get(stem).is_some() => continue,
                 (_, Some(ratio)) if self.effect.is_coupling() => {
                     let [own, next] =
                         [self.joint, self.joint.next()].map(|j| graph.input(&j.name(stem)));
@@ -159,7 +172,9 @@ impl FittedEffect {
         }
         let mut outputs = vec![lower(&scope, &mut graph, formula)];
         for state in &self.effect.states {
-            outputs.push(lower(&scope, &mut graph, &state.rate));
+            let rate = state.rate.as_ref();
+            let rate = rate.map(|rate| lower(&scope, &mut graph, rate));
+            outputs.push(rate.unwrap_or_else(|| graph.constant(0.0)));
             let ends = state.within.as_ref();
             for end in 0..2 {
                 let end = ends.map(|ends| lower(&scope, &mut graph, &ends[end]));
@@ -204,9 +219,9 @@ impl FittedEffect {
                 unit: unit_on(prismatic, &parameter.unit),
                 bounds: match parameter.measure {
                     Measure::One => parameter.bounds,
-                    Measure::Speed | Measure::Torque | Measure::Duration => [0.0, f64::INFINITY],
+                    _ => [0.0, f64::INFINITY],
                 },
-                fixed: self.fixed || parameter.whole,
+                fixed: self.fixed || parameter.whole || parameter.hold == Hold::Held,
                 per_log: parameter.per_log,
                 per_group: false,
                 ci95: *ci95,

@@ -3,6 +3,7 @@
 use crate::expr::{Binary, Formula, Graph, Node, Program, Scope};
 
 use super::assemble::lower;
+use super::effect::TRANSMISSION_NAMES;
 use super::filter::Filter;
 use super::input_layout::InputLayout;
 
@@ -12,8 +13,9 @@ pub struct InternalState {
     pub name: String,
     pub unit: String,
     pub about: String,
-    /// Its time derivative, in the names that the effect's formula may use.
-    pub rate: Formula,
+    /// Its time derivative, in the names that the effect's formula may use. `None` for the states of a transmission,
+    /// which follow from the motion of both of its sides.
+    pub rate: Option<Formula>,
     /// Its value before a log begins, in the effect's parameters; zero if the file does not say.
     pub start: Option<Formula>,
     /// The ends of the range that it stays in, in the names of `rate`: at an end it moves only back.
@@ -29,6 +31,8 @@ pub struct InternalStates {
     pub rates: Program,
     /// The value of each before a log begins, from the model's parameters.
     pub starts: Program,
+    /// Whether each has come to rest under what acts at a log's first row.
+    pub settled: Vec<bool>,
     /// What depends on what: state by state, and then by parameter.
     pub pairs: Vec<Dependence>,
 }
@@ -44,7 +48,7 @@ pub struct Dependence {
 
 impl InternalStates {
     pub(super) fn new(
-        names: Vec<String>,
+        (names, settled): (Vec<String>, Vec<bool>),
         [rates, starts]: [Program; 2],
         layout: InputLayout,
         filters: &[Filter],
@@ -82,6 +86,7 @@ impl InternalStates {
         Self {
             pairs: pairs.collect(),
             names,
+            settled,
             rates,
             starts,
         }
@@ -92,9 +97,26 @@ impl InternalStates {
 const SHORTEST_S: f64 = 1e-9;
 
 impl InternalState {
+    /// By what a motor leads its link, and how fast that grows.
+    pub(super) fn of_transmission() -> [Self; 2] {
+        let [twist, twist_rate, _] = TRANSMISSION_NAMES;
+        let states = [
+            (twist, "rad", "angle by which the motor leads the link"),
+            (twist_rate, "rad/s", "rate of the twist"),
+        ];
+        states.map(|(name, unit, about)| Self {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            about: about.to_owned(),
+            rate: None,
+            start: None,
+            within: None,
+        })
+    }
+
     /// All of its formulas that may mention more than parameters.
     pub fn formulas(&self) -> impl Iterator<Item = &Formula> {
-        [&self.rate].into_iter().chain(self.within.iter().flatten())
+        self.rate.iter().chain(self.within.iter().flatten())
     }
 
     /// A mean rate that leaves the state within its range.
@@ -129,9 +151,9 @@ impl InternalState {
 /// The mean rates of an effect's states over a step of the length `step` that begins at `starts`, with everything else as
 /// `scope` has it.
 ///
-/// With the matrix A of the rates' derivatives with respect to the states, the step is that of a linear equation whose
-/// exponential exp(A h) is taken as 1/(1 - A h + (A h)^2/2): accurate to second order, and it decays however fast the states
-/// do.
+/// With the matrix A of the rates' derivatives with respect to the states, the step is that of a linear equation. For one
+/// state its exponential exp(A h) is taken as 1/(1 - A h + (A h)^2/2), which never overshoots; for two, which may swing, as
+/// (1 + A h/3)/(1 - 2 A h/3 + (A h)^2/6), which damps a swing nine times less. Both decay however fast the states do.
 pub(super) fn mean_rates(
     states: &[InternalState],
     graph: &mut Graph,
@@ -141,8 +163,8 @@ pub(super) fn mean_rates(
     for (state, start) in states.iter().zip(starts) {
         scope.bind(&state.name, *start);
     }
-    let rates = states.iter().map(|state| lower(&scope, graph, &state.rate));
-    let rates: Vec<Node> = rates.collect();
+    let rates = states.iter().filter_map(|state| state.rate.as_ref());
+    let rates: Vec<Node> = rates.map(|rate| lower(&scope, graph, rate)).collect();
     let growth = graph.jacobian(&rates, starts);
     let growth = growth.into_iter().map(|row| {
         let scaled = row.into_iter().map(|slope| graph.mul(slope, step));
@@ -179,20 +201,26 @@ fn mean_of_one(graph: &mut Graph, rate: Node, growth: Node) -> Node {
     graph.mul(rate, share)
 }
 
-/// The same for two states whose growths are a matrix G: (1 - G/2) (1 - G + G^2/2)^-1 times the rates.
-fn mean_of_two(graph: &mut Graph, rates: [Node; 2], growth: [[Node; 2]; 2]) -> [Node; 2] {
+/// (1 - G/6) (1 - 2 G/3 + G^2/6)^-1 times the rates of two states, whose growths are the matrix G.
+pub(super) fn mean_of_two(
+    graph: &mut Graph,
+    rates: [Node; 2],
+    growth: [[Node; 2]; 2],
+) -> [Node; 2] {
     if growth.iter().flatten().all(|entry| graph.is_zero(*entry)) {
         return rates;
     }
-    let [half, one, zero] = [0.5, 1.0, 0.0].map(|value| graph.constant(value));
+    let [sixth, most, one, zero] =
+        [1.0 / 6.0, 2.0 / 3.0, 1.0, 0.0].map(|value| graph.constant(value));
     let mut matrix = [[zero; 2]; 2];
     for (row, of_row) in matrix.iter_mut().enumerate() {
         for (column, entry) in of_row.iter_mut().enumerate() {
             let of_column = [growth[0][column], growth[1][column]];
             let square = graph.dot(&growth[row], &of_column);
-            let square = graph.mul(half, square);
+            let square = graph.mul(sixth, square);
             let rest = if row == column { one } else { zero };
-            let rest = graph.sub(rest, growth[row][column]);
+            let own = graph.mul(most, growth[row][column]);
+            let rest = graph.sub(rest, own);
             *entry = graph.add(rest, square);
         }
     }
@@ -207,7 +235,7 @@ fn mean_of_two(graph: &mut Graph, rates: [Node; 2], growth: [[Node; 2]; 2]) -> [
     });
     [0, 1].map(|row| {
         let moved = graph.dot(&growth[row], &solved);
-        let moved = graph.mul(half, moved);
+        let moved = graph.mul(sixth, moved);
         graph.sub(solved[row], moved)
     })
 }

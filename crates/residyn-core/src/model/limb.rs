@@ -66,6 +66,7 @@ impl Model {
             prismatic: of_joints(&self.prismatic, joints),
             smoothing_velocity: (self.smoothing_velocity.as_ref())
                 .map(|widths| of_joints(widths, joints)),
+            sides: (self.sides.as_ref()).map(|sides| of_joints(sides, joints)),
             columns: self.columns.of_joints(joints),
             equations: Arc::new(Equations {
                 motion: Motion::Tree(Box::new(bodies.limb(joints))),

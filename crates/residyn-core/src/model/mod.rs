@@ -40,11 +40,14 @@ mod values;
 pub mod weights;
 mod written;
 
+#[cfg(test)]
+pub(crate) use assemble::{elastic, viscous};
 pub use call::{Call, InputFile};
 pub use configuration::{Configuration, InLog};
 pub use dynamics::{Dynamics, Parameter, PerLogValue};
 pub use effect::{
-    ActsOn, AlikeOn, EFFECT_NAMES, Effect, EffectParameter, Entry, Logged, Measure, ShowsIn,
+    ActsOn, AlikeOn, EFFECT_NAMES, Effect, EffectParameter, Entry, Hold, Logged, Measure, ShowsIn,
+    Side,
 };
 pub use error::ModelError;
 pub use filter::{CommandFilter, Filter};

@@ -4,10 +4,11 @@ use std::collections::HashSet;
 
 use toml_edit::{DocumentMut, TomlError};
 
+use super::effect::Side;
 use super::network::check_hidden;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::Motion;
-use super::tables::{ParameterTable, ResidualTable, SystemTable};
+use super::tables::{ParameterTable, ResidualTable, SensorsTable, SystemTable};
 use super::values::{Limits, Named, Per};
 use super::{MlpSettings, Parameter};
 use crate::data::Joint;
@@ -123,6 +124,21 @@ pub(super) fn joint(
     })
 }
 
+/// The side of its transmission on which the sensor of each joint is, if the file says.
+pub(super) fn sides(
+    table: Option<SensorsTable<'_>>,
+    joints: usize,
+) -> Result<Option<Vec<Side>>, FileError> {
+    let Some(SensorsTable { angle, section }) = table else {
+        return Ok(None);
+    };
+    if angle.len() != joints {
+        let message = format!("`angle` must be a list of {joints} sides, one per joint");
+        return Err(section.error_at("angle", message));
+    }
+    Ok(Some(angle))
+}
+
 /// Widths of the hidden layers of the residual network; the published ones if the file gives none.
 pub(super) fn hidden(
     table: Option<ResidualTable<'_>>,
@@ -190,4 +206,30 @@ pub(super) fn declaration(document: &Document) -> Result<String, FileError> {
         None => document.text.clone(),
     };
     Ok(declared.trim_end().to_owned() + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::model::{Library, Side};
+
+    #[test]
+    fn sensors_have_one_side_for_each_joint() {
+        let library = Library::built_in();
+        let read = |sides: &str| {
+            let text = format!(
+                "[system]\nname = \"arm\"\njoints = 2\n[parameters]\n[sensors]\nangle = {sides}\n\
+                 [dynamics]\nqdd1 = \"tau1\"\nqdd2 = \"tau2\"\n"
+            );
+            library.model_from_text("arm.toml", &text)
+        };
+        let arm = read("[\"motor\", \"link\"]").unwrap();
+        assert_eq!(arm.sides, Some(vec![Side::Motor, Side::Link]));
+        for (wrong, says) in [
+            ("[\"motor\"]", "a list of 2 sides"),
+            ("[\"motor\", \"gear\"]", "\"link\" or \"motor\""),
+        ] {
+            let error = read(wrong).unwrap_err().to_string();
+            assert!(error.contains("line 6") && error.contains(says), "{error}");
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Declared parameters that are held fixed although the rig may have another value.
 
 use super::Parameter;
-use super::effect::{ActsOn, AlikeOn, Effect, EffectParameter, Entry, Measure, ShowsIn};
+use super::effect::{ActsOn, AlikeOn, Effect, EffectParameter, Entry, Hold, Measure, ShowsIn};
 use super::fitted::FittedEffect;
 use super::reader::Located;
 use super::system::{Model, Motion};
@@ -81,6 +81,7 @@ fn shift(k: usize, declared: &Parameter) -> Effect {
             measure: Measure::One,
             whole: false,
             per_log: false,
+            hold: Hold::Never,
         }],
         states: Vec::new(),
         valid_if: None,

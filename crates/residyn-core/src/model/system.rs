@@ -6,7 +6,7 @@ use super::bodies::Bodies;
 use super::configuration::{Configuration, Differing};
 use super::drive::Drive;
 use super::dynamics::{Dynamics, Parameter, PerLogValue};
-use super::effect::{ActsOn, Effect, Entry, Measure};
+use super::effect::{ActsOn, Effect, Entry, Measure, Side};
 use super::error::ModelError;
 use super::fitted::FittedEffect;
 use super::input_layout::InputLayout;
@@ -80,6 +80,8 @@ pub struct Model {
     pub effects: Vec<FittedEffect>,
     /// Widths of the hidden layers of the residual MLP.
     pub hidden: Vec<usize>,
+    /// The side of a transmission on which the sensor of each joint is, if the file says.
+    pub sides: Option<Vec<Side>>,
     /// The text of the file.
     pub text: String,
     /// The text of the declared part of the file: everything but the effects.
@@ -334,10 +336,16 @@ impl Model {
     }
 
     /// Set the interval of a parameter's value, or of its value in one log, by its half width; it is clipped to the
-    /// parameter's bounds.
+    /// parameter's bounds. Values of an effect that stand on one that no log determines have none.
     pub fn set_half_width(&mut self, parameter: usize, log: Option<&Log>, half: f64) {
         let [low, high] = self.all_parameters()[parameter].bounds;
-        let around = |value: f64| Some([(value - half).max(low), (value + half).min(high)]);
+        let stands_on_held = self
+            .placed()
+            .any(|(effect, place)| effect.effect.held().is_some() && place.contains(&parameter));
+        let around = |value: f64| {
+            let interval = [(value - half).max(low), (value + half).min(high)];
+            (!stands_on_held).then_some(interval)
+        };
         let Some(log) = log else {
             let (value, interval) = self.slots().swap_remove(parameter);
             *interval = around(*value);

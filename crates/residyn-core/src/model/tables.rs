@@ -8,6 +8,7 @@ use super::effect::ActsOn;
 use super::effect::AlikeOn;
 use super::effect::Measure;
 use super::effect::ShowsIn;
+use super::effect::Side;
 use super::filter::CommandFilter;
 use super::reader::{Entry, FileError, Located, Section};
 use super::values::{ColumnName, EachLog, JointKey, Limits, Named, OrTable, Per, Read};
@@ -60,6 +61,7 @@ tables! {
         chain: Option<ChainTable<'a>>,
         energy: Option<EnergyTable<'a>>,
         residual: Option<ResidualTable<'a>>,
+        sensors: Option<SensorsTable<'a>>,
         effect: Vec<Section<'a>>,
     }
 
@@ -124,6 +126,10 @@ tables! {
         power: Located<Formula>,
     }
 
+    struct SensorsTable<'a> {
+        angle: Vec<Side>,
+    }
+
     struct ResidualTable<'a> {
         hidden: Option<Vec<usize>>,
     }
@@ -160,6 +166,7 @@ tables! {
         reading: Option<Located<Formula>>,
         coupling: Option<Located<Formula>>,
         payload: Option<Located<Formula>>,
+        transmission: Option<Located<Formula>>,
         contains: Vec<String>,
         refines: bool,
         confused_with: Vec<String>,
@@ -189,6 +196,7 @@ tables! {
         search: Option<Vec<f64>>,
         relative_to: Option<Measure>,
         whole: bool,
+        held_if_unknown: bool,
         per: Option<EachLog>,
     }
 

@@ -97,6 +97,7 @@ impl FittedEffect {
         match &self.effect.entry {
             Entry::Force(_) => format!("added to {}", of_joint("tau")),
             Entry::Torque(_) => format!("in place of {}", of_joint("tau")),
+            Entry::Transmission(_) => "passed from the motor to the link".to_owned(),
             Entry::Angle(_) => format!("in place of {}", of_joint("q")),
             Entry::Payload(_) => "a mass on the last body".to_owned(),
             Entry::Coupling(_) => format!(

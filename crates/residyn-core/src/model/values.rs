@@ -2,7 +2,7 @@
 
 use toml::de::DeValue;
 
-use super::effect::{ActsOn, AlikeOn, Measure, ShowsIn};
+use super::effect::{ActsOn, AlikeOn, Measure, ShowsIn, Side};
 use super::filter::CommandFilter;
 use super::fitted::Status;
 use super::reader::{Entry, FileError, Located, Section};
@@ -264,6 +264,7 @@ impl Word for Measure {
     const WORDS: &'static [(&'static str, Self)] = &[
         ("speed", Self::Speed),
         ("torque", Self::Torque),
+        ("inertia", Self::Inertia),
         ("duration", Self::Duration),
     ];
 }
@@ -302,6 +303,10 @@ impl Word for AlikeOn {
         ("like joints", Self::LikeJoints),
         ("commanded", Self::Commanded),
     ];
+}
+
+impl Word for Side {
+    const WORDS: &'static [(&'static str, Self)] = &[("link", Self::Link), ("motor", Self::Motor)];
 }
 
 impl Word for EachLog {

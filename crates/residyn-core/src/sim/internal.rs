@@ -3,6 +3,9 @@
 //! Where a motion is measured, the states of effects do not depend on how well the model predicts it. They are integrated
 //! along the log, once for each set of parameters, and then stand beside the measured columns.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use super::scheme::{HEUN, Scheme};
 use super::{Commands, Point};
 use crate::data::{Log, Measured, half_width_s, local_cubic};
@@ -16,40 +19,70 @@ const LANES: usize = 8;
 /// states that decay are accurate to second order in the step.
 const STEP_S: f64 = 4e-3;
 const SCHEME: &Scheme = HEUN;
+/// Steps in which states come to rest, so long that each is one of Newton's.
+const SETTLING: usize = 4;
+const SETTLING_S: f64 = 1e3;
 
-/// The angles of a log (`[joint][row]`, rad or m), each smoothed by the rows around it.
+/// The angles of a log (`[joint][row of the grid]`, rad or m), each smoothed by the rows of the log around it.
 #[derive(Debug, Clone)]
 pub struct LoggedMotion {
-    /// s
-    time: Vec<f64>,
     q: Vec<Vec<f64>>,
-    /// The rows between which steps are taken.
-    grid: Vec<usize>,
+    grid: Arc<Grid>,
+}
+
+/// The rows of a log between which steps are taken.
+#[derive(Debug, Default)]
+struct Grid {
+    /// Of all rows of the log, s.
+    time: Vec<f64>,
+    rows: Vec<usize>,
 }
 
 impl LoggedMotion {
     pub fn of(log: &Log) -> Self {
-        let half_width = half_width_s(log.median_step());
-        let smoothed = |q: &Vec<f64>| {
-            let at = |row: usize| {
-                let found = local_cubic(&log.time, q, row, half_width);
-                found.map_or(q[row], |found| found.value)
-            };
-            (0..log.rows()).map(at).collect()
-        };
-        let mut grid = vec![0];
+        let mut rows = vec![0];
         for row in 1..log.rows() {
-            let last = grid[grid.len() - 1];
+            let last = rows[rows.len() - 1];
             // Logged times are rounded decimals.
             if log.time[row] - log.time[last] > 0.99 * STEP_S || row + 1 == log.rows() {
-                grid.push(row);
+                rows.push(row);
             }
         }
+        let half_width = half_width_s(log.median_step());
+        let smoothed = |q: &Vec<f64>| {
+            let at = |row: &usize| {
+                let found = local_cubic(&log.time, q, *row, half_width);
+                found.map_or(q[*row], |found| found.value)
+            };
+            rows.iter().map(at).collect()
+        };
         Self {
-            time: log.time.clone(),
             q: log.q.iter().map(smoothed).collect(),
-            grid,
+            grid: Arc::new(Grid {
+                time: log.time.clone(),
+                rows,
+            }),
         }
+    }
+}
+
+impl Grid {
+    /// A channel that is given at the rows of the grid, at these rows of the log.
+    fn between(&self, channel: &[f64], rows: Range<usize>) -> Vec<f64> {
+        let after = self.rows.partition_point(|row| *row <= rows.start);
+        let mut next = after.min(self.rows.len() - 1).max(1);
+        let at = |row: usize| {
+            while next + 1 < self.rows.len() && self.rows[next] < row {
+                next += 1;
+            }
+            let Some(end) = self.rows.get(next) else {
+                return channel[0];
+            };
+            let [from, to] = [self.time[self.rows[next - 1]], self.time[*end]];
+            let share = (self.time[row] - from) / (to - from);
+            channel[next - 1] + share * (channel[next] - channel[next - 1])
+        };
+        rows.map(at).collect()
     }
 }
 
@@ -211,12 +244,33 @@ pub struct Case<'a> {
     pub commands: &'a Commands<'a>,
 }
 
-/// The internal states at the rows of a log, `[state][row]`, and their derivatives with respect to parameters,
-/// `[pair][row]` in the order of [`InternalRates::pairs`], if asked for.
+/// The internal states along a log, and their derivatives with respect to parameters in the order of
+/// [`InternalRates::pairs`], if asked for.
 #[derive(Debug, Clone, Default)]
 pub struct Course {
-    pub values: Vec<Vec<f64>>,
-    pub slopes: Vec<Vec<f64>>,
+    grid: Arc<Grid>,
+    /// `[channel][row of the grid]`: the states, then the derivatives.
+    channels: Vec<Vec<f64>>,
+    states: usize,
+}
+
+impl Course {
+    /// The states at these rows of the log, `[state][row]`.
+    pub fn states(&self, rows: Range<usize>) -> Vec<Vec<f64>> {
+        self.between(0..self.states, rows)
+    }
+
+    /// The derivatives at these rows of the log, `[pair][row]`.
+    pub fn slopes(&self, rows: Range<usize>) -> Vec<Vec<f64>> {
+        self.between(self.states..self.channels.len(), rows)
+    }
+
+    fn between(&self, channels: Range<usize>, rows: Range<usize>) -> Vec<Vec<f64>> {
+        let channels = self.channels[channels].iter();
+        channels
+            .map(|channel| self.grid.between(channel, rows.clone()))
+            .collect()
+    }
 }
 
 /// The internal states of a model along one log, `[state][row]`; empty for a model without any.
@@ -232,7 +286,8 @@ pub fn internal_along(point: &Point<'_>, log: &Log, commands: &Commands<'_>) -> 
         commands,
     };
     let mut courses = rates.along(&[case]);
-    courses.pop().map_or_else(Vec::new, |course| course.values)
+    let course = courses.pop();
+    course.map_or_else(Vec::new, |course| course.states(0..log.rows()))
 }
 
 /// Internal states at the start of a motion, `[lane]`, with their slopes by parameters.
@@ -255,15 +310,17 @@ impl<const W: usize> Default for InternalStart<W> {
 impl<const W: usize> InternalStart<W> {
     /// Those at a row of each lane's course, with the slopes of these pairs.
     pub fn of(lanes: [(&Course, usize); W], pairs: &[Dependence]) -> Self {
-        let at =
-            |of: &dyn Fn(&Course) -> &[f64]| Row::from_fn(|lane| of(lanes[lane].0)[lanes[lane].1]);
-        let states = 0..lanes[0].0.values.len();
-        let slopes = pairs.iter().enumerate();
+        let of_lane = |(course, row): (&Course, usize)| {
+            let all = course.between(0..course.states + pairs.len(), row..row + 1);
+            all.concat()
+        };
+        let all = lanes.map(of_lane);
+        let at = |channel: usize| Row::from_fn(|lane| all[lane][channel]);
+        let states = lanes[0].0.states;
+        let slopes = pairs.iter().zip(states..);
         Self {
-            values: states.map(|k| at(&|course| &course.values[k])).collect(),
-            slopes: slopes
-                .map(|(k, pair)| (*pair, at(&|course| &course.slopes[k])))
-                .collect(),
+            values: (0..states).map(at).collect(),
+            slopes: slopes.map(|(pair, channel)| (*pair, at(channel))).collect(),
         }
     }
 }
@@ -281,8 +338,8 @@ struct Track {
 
 impl InternalRates {
     fn track(&self, case: &Case<'_>) -> Track {
-        let LoggedMotion { time, q, grid } = case.motion;
-        let at_grid = |channel: &[f64]| grid.iter().map(|row| channel[*row]).collect::<Vec<f64>>();
+        let LoggedMotion { q, grid } = case.motion;
+        let Grid { time, rows: grid } = &**grid;
         let mean = |channel: &Vec<f64>| -> Vec<f64> {
             let steps = grid.windows(2).map(|ends| &channel[ends[0]..ends[1]]);
             steps
@@ -304,8 +361,8 @@ impl InternalRates {
         };
         let measured = measured.into_iter().map(mean);
         Track {
-            time: at_grid(time),
-            q: q.iter().map(|q| at_grid(q)).collect(),
+            time: grid.iter().map(|row| time[*row]).collect(),
+            q: q.clone(),
             given: [torques, measured.collect()].concat(),
             slopes: filters.iter().map(slope).collect(),
         }
@@ -315,6 +372,7 @@ impl InternalRates {
     fn along_some<const W: usize>(&self, cases: &[Case<'_>]) -> Vec<Course> {
         let tracks: Vec<Track> = cases.iter().map(|case| self.track(case)).collect();
         let mut walk = Walk::<W>::new(self, cases);
+        walk.settle(&tracks);
         let first = |lane: usize| walk.now.iter().map(move |now| vec![now[lane]]).collect();
         let mut courses: Vec<Vec<Vec<f64>>> = (0..cases.len()).map(first).collect();
         let steps = tracks.iter().map(Track::steps).max().unwrap_or(0);
@@ -327,19 +385,13 @@ impl InternalRates {
                 }
             }
         }
-        let each = courses.iter().zip(cases);
-        each.map(|(course, case)| self.course(course, case.motion))
-            .collect()
-    }
-
-    /// The course at all rows of its log.
-    fn course(&self, at_grid: &[Vec<f64>], motion: &LoggedMotion) -> Course {
-        let at_rows = |channel: &Vec<f64>| motion.at_rows(channel);
-        let (values, slopes) = at_grid.split_at(self.internal.names.len());
-        Course {
-            values: values.iter().map(at_rows).collect(),
-            slopes: slopes.iter().map(at_rows).collect(),
-        }
+        let each = courses.into_iter().zip(cases);
+        each.map(|(channels, case)| Course {
+            grid: Arc::clone(&case.motion.grid),
+            channels,
+            states: self.internal.names.len(),
+        })
+        .collect()
     }
 }
 
@@ -349,27 +401,17 @@ impl Track {
     }
 }
 
-impl LoggedMotion {
-    /// A channel that is given at the rows of the grid, at all rows.
-    fn at_rows(&self, channel: &[f64]) -> Vec<f64> {
-        let time = &self.time;
-        let mut all = vec![channel[0]; time.len()];
-        for (ends, values) in self.grid.windows(2).zip(channel.windows(2)) {
-            let slope = (values[1] - values[0]) / (time[ends[1]] - time[ends[0]]);
-            for row in ends[0]..=ends[1] {
-                all[row] = values[0] + slope * (time[row] - time[ends[0]]);
-            }
-        }
-        all
-    }
-}
-
 /// Steps along logs, one in each lane.
 struct Walk<'r, const W: usize> {
     rates: &'r InternalRates,
     tape: Tape<f64, W>,
-    /// The states, then their slopes.
+    /// The states, then their slopes: now, in a stage, and after a step; and the rates of all of them.
     now: Vec<Row<f64, W>>,
+    inner: Vec<Row<f64, W>>,
+    next: Vec<Row<f64, W>>,
+    slopes: Vec<Row<f64, W>>,
+    /// The mean slopes of the torques of filters over a step.
+    filters: Vec<Row<f64, W>>,
 }
 
 impl<'r, const W: usize> Walk<'r, W> {
@@ -391,19 +433,54 @@ impl<'r, const W: usize> Walk<'r, W> {
         };
         let starts: Vec<Vec<f64>> = (0..W).map(starts).collect();
         let now = Row::table(starts[0].len(), |k, lane| starts[lane][k]);
-        Self { rates, tape, now }
+        Self {
+            rates,
+            tape,
+            inner: now.clone(),
+            next: now.clone(),
+            slopes: now.clone(),
+            now,
+            filters: Vec::new(),
+        }
+    }
+
+    /// Bring the states that rest under what acts at the first row to rest there, with their slopes.
+    fn settle(&mut self, tracks: &[Track]) {
+        let internal = &self.rates.internal;
+        if !internal.settled.contains(&true) || tracks.iter().any(|track| track.steps() == 0) {
+            return;
+        }
+        let of_pairs = self
+            .rates
+            .pairs
+            .iter()
+            .map(|pair| internal.settled[pair.state]);
+        let settled: Vec<bool> = internal.settled.iter().copied().chain(of_pairs).collect();
+        for _ in 0..SETTLING {
+            self.move_on(tracks, 0, Some(SETTLING_S));
+            let each = self.now.iter_mut().zip(&self.next).zip(&settled);
+            each.filter(|(_, settled)| **settled)
+                .for_each(|((now, next), _)| *now = *next);
+        }
     }
 
     /// Move along one step of each log; lanes whose log has ended stay where they are.
     fn step(&mut self, tracks: &[Track], step: usize) {
+        self.move_on(tracks, step, None);
+        std::mem::swap(&mut self.now, &mut self.next);
+    }
+
+    /// Work out what is next, after one step of each log or after a step of another length under the same inputs.
+    fn move_on(&mut self, tracks: &[Track], step: usize, length_s: Option<f64>) {
         let layout = self.rates.layout;
         let track = |lane: usize| tracks.get(lane).filter(|track| step < track.steps());
         let read = |of: &dyn Fn(&Track) -> f64| Row::from_fn(|lane| track(lane).map_or(0.0, of));
-        let h = read(&|track| track.time[step + 1] - track.time[step]);
+        let between = read(&|track| track.time[step + 1] - track.time[step]);
+        let h = length_s.map_or(between, Row::splat);
         let states = self.rates.internal.names.len();
         let filters = 0..tracks[0].slopes.len();
-        let filters = filters.map(|k| read(&|track| track.slopes[k][step]));
-        let filters: Vec<Row<f64, W>> = filters.collect();
+        self.filters.clear();
+        (self.filters).extend(filters.map(|k| read(&|track| track.slopes[k][step])));
         let inputs = self.tape.moving();
         let reads = &self.rates.reads;
         for (k, place) in layout
@@ -425,7 +502,8 @@ impl<'r, const W: usize> Walk<'r, W> {
         }
         inputs[layout.starts()].copy_from_slice(&self.now[..states]);
         inputs[layout.step()] = h;
-        let (mut sum, mut inner) = (self.now.clone(), self.now.clone());
+        self.next.copy_from_slice(&self.now);
+        self.inner.copy_from_slice(&self.now);
         for stage in SCHEME.stages {
             let inputs = self.tape.moving();
             for joint in layout.positions().filter(|joint| reads[*joint]) {
@@ -437,42 +515,41 @@ impl<'r, const W: usize> Walk<'r, W> {
             let time = |track: &Track| track.time[step];
             inputs[layout.time()] = read(&time);
             for lane in 0..W {
-                inputs[layout.time()][lane] += stage.time * h[lane];
+                inputs[layout.time()][lane] += stage.time * between[lane];
             }
-            inputs[layout.internal()].copy_from_slice(&inner[..states]);
+            inputs[layout.internal()].copy_from_slice(&self.inner[..states]);
             self.tape.run();
-            let slopes = self.slopes(&inner, &filters);
-            for (k, slope) in slopes.iter().enumerate() {
+            for k in 0..self.slopes.len() {
+                self.slopes[k] = self.slope(k);
+            }
+            for (k, slope) in self.slopes.iter().enumerate() {
                 for lane in 0..W {
-                    sum[k][lane] += stage.weight * h[lane] * slope[lane];
-                    inner[k][lane] = self.now[k][lane] + stage.reach * h[lane] * slope[lane];
+                    self.next[k][lane] += stage.weight * h[lane] * slope[lane];
+                    self.inner[k][lane] = self.now[k][lane] + stage.reach * h[lane] * slope[lane];
                 }
             }
         }
-        self.now = sum;
     }
 
-    /// The rates of the states and of their slopes, where these are `inner` and the tape has run.
-    fn slopes(&self, inner: &[Row<f64, W>], filters: &[Row<f64, W>]) -> Vec<Row<f64, W>> {
+    /// The rate of a state, or of a slope of one, in a stage for which the tape has run.
+    fn slope(&self, k: usize) -> Row<f64, W> {
         let states = self.rates.internal.names.len();
+        if k < states {
+            return *self.tape.output(k);
+        }
         let one = Row::splat(1.0);
-        let of_pair = |terms: &Vec<Term>| {
-            let mut rate = Row::splat(0.0);
-            for Term { factor, times } in terms {
-                let factor = self.tape.output(*factor);
-                let times = match *times {
-                    Times::One => &one,
-                    Times::Now(pair) => &inner[states + pair],
-                    Times::Start(pair) => &self.now[states + pair],
-                    Times::Filter(filter) => &filters[filter],
-                };
-                (0..W).for_each(|lane| rate[lane] += factor[lane] * times[lane]);
-            }
-            rate
-        };
-        let of_states = (0..states).map(|k| *self.tape.output(k));
-        let of_slopes = self.rates.terms.iter().map(of_pair);
-        of_states.chain(of_slopes).collect()
+        let mut rate = Row::splat(0.0);
+        for Term { factor, times } in &self.rates.terms[k - states] {
+            let factor = self.tape.output(*factor);
+            let times = match *times {
+                Times::One => &one,
+                Times::Now(pair) => &self.inner[states + pair],
+                Times::Start(pair) => &self.now[states + pair],
+                Times::Filter(filter) => &self.filters[filter],
+            };
+            (0..W).for_each(|lane| rate[lane] += factor[lane] * times[lane]);
+        }
+        rate
     }
 }
 

@@ -38,8 +38,8 @@ pub(crate) fn structure(report: &Report) -> String {
     let structure = match left.place.as_str() {
         UNKNOWN => format!(
             "The residuals are not white noise ({p}; {share:.0} % of their variance exceeds it), but they are not a \
-             smooth function of angle, speed, torque or time. Candidates are effects with a state or a frequency of \
-             their own: joint compliance, presliding friction, a periodic disturbance."
+             smooth function of angle, speed, torque or time. Candidates are effects that the library lacks: a link that \
+             bends, play with a motor behind it, a periodic disturbance."
         ),
         place if left.is_significant() => format!("The residual depends on {place} ({p})."),
         _ if left.p_value < settings.significance => format!(

@@ -32,8 +32,12 @@ pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted, limit: f64) -> V
     for Swap { place, new } in promising(problem, &fitted, swaps(problem, &fitted), limit) {
         let mut rest = fitted.clone();
         let old = rest.model.effects.remove(place);
-        let mut starts = Vec::from_iter(in_place_of(problem, &rest, &old, &new));
-        if new.effect.name == old.effect.name {
+        let is_itself = new.effect.name == old.effect.name;
+        let mut starts = Vec::new();
+        if !is_itself || has_switch(&new) {
+            starts.extend(in_place_of(problem, &rest, &old, &new));
+        }
+        if is_itself {
             starts.extend(with_numbers_beside(problem, &rest, &old));
         }
         sets.extend(starts.into_iter().map(|start| {
@@ -118,7 +122,8 @@ fn in_place_of(
     Some(carried.unwrap_or(absent))
 }
 
-/// An effect with the searched whole numbers next to its present one.
+/// An effect with the searched whole numbers next to its present one: where it starts from absent if some value switches it
+/// off, else at its other values.
 fn with_numbers_beside(
     problem: &Problem<'_>,
     rest: &Fitted,
@@ -134,6 +139,12 @@ fn with_numbers_beside(
         let below = numbers().filter(|number| *number < own).reduce(f64::max);
         let above = numbers().filter(|number| *number > own).reduce(f64::min);
         for number in below.into_iter().chain(above) {
+            if !has_switch(old) {
+                let mut moved = old.clone();
+                moved.values[k].0 = number;
+                starts.push(moved);
+                continue;
+            }
             let mut single = old.clone();
             single.effect.parameters[k].starts = vec![number];
             starts.extend(

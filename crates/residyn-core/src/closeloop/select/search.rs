@@ -289,10 +289,13 @@ impl<'a> Search<'a> {
 
     /// The declared model with each set of effects in place of a trial's, fitted at the trial's scale; sets that cannot
     /// be fitted, or leave a loss above `below`, are left out. The loss on left-out blocks is never smaller than that
-    /// of the fit itself. An effect with values at a bound is replaced by the effects that it contains.
+    /// of the fit itself. An effect with values at a bound is replaced by the effects that it contains; of one with a value
+    /// that the logs do not determine, that is held if the effect's file allows it.
     fn fitted(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>, below: f64) -> Vec<Trial> {
         let problem = self.problem;
         sets.iter_mut().for_each(without_contained);
+        let effects = sets.iter_mut().flatten();
+        effects.for_each(|effect| effect.effect.free_held());
         let most = (problem.settings.select).most_effects_of(problem.declared.joints);
         sets.retain(|set| set.len() <= most);
         let key = |set: &Vec<FittedEffect>| problem.key(set);
@@ -301,7 +304,8 @@ impl<'a> Search<'a> {
             let found = self.fitted_from(from, &set, below)?;
             let valid = match found.is_valid(problem) {
                 true => found,
-                false => self.repaired_from(&found, below)?,
+                false => (self.repaired_from(&found, below))
+                    .or_else(|| self.with_unknown_held(&found, below))?,
             };
             // There may be hundreds.
             Some(valid.without_windows())
@@ -470,6 +474,19 @@ impl<'a> Search<'a> {
         let declared = &problem.declared.effects;
         let set = repaired(problem, declared, trial.added(problem));
         let found = self.fitted_from(trial, &set, below);
+        found.filter(|found| found.is_valid(problem))
+    }
+
+    /// A trial in which what logs need not determine of its effects is held, fitted from there to a loss of `below`; `None`
+    /// if there is nothing of the kind, or if no valid set results.
+    fn with_unknown_held(&self, trial: &Trial, below: f64) -> Option<Trial> {
+        let problem = self.problem;
+        let added = trial.added(problem);
+        let held: Vec<_> = added.iter().map(FittedEffect::with_unknown_held).collect();
+        held.iter().flatten().next()?;
+        let set = held.into_iter().zip(added);
+        let set = set.map(|(held, as_it_is)| held.unwrap_or_else(|| as_it_is.clone()));
+        let found = self.fitted_from(trial, &set.collect::<Vec<_>>(), below);
         found.filter(|found| found.is_valid(problem))
     }
 }

@@ -9,7 +9,7 @@ use super::simpler::{parts, repaired, simpler};
 use super::trial::Trial;
 use crate::closeloop::fit::Declared;
 use crate::closeloop::tests::{Study, absent, pendulum};
-use crate::model::{FittedEffect, Library};
+use crate::model::{FittedEffect, Library, Side};
 
 #[test]
 fn what_is_left_out_together_is_a_connected_part_of_one_log() {
@@ -110,6 +110,20 @@ fn what_most_machines_have_is_said_by_effect_files() {
     let sets: Vec<_> = baseline_sets(&problem).iter().map(names).collect();
     assert_eq!(sets, [vec!["grease"], vec!["bearing", "grease"]]);
     assert_eq!(names(&baseline_friction(&problem)), ["grease"]);
+}
+
+#[test]
+fn both_sides_of_a_transmission_are_tried_unless_the_file_says_where_the_sensor_is() {
+    let mut study = Study::of_friction();
+    let sides = |study: &Study| {
+        let FittedEffect { effect, joint, .. } = absent("joint_elasticity");
+        let measured = study.problem().measured(&effect, joint);
+        let mut parameters = measured.parameters.into_iter();
+        parameters.find(|own| own.name == "sensor").unwrap().starts
+    };
+    assert_eq!(sides(&study), [1.0, 0.0]);
+    study.declared.sides = Some(vec![Side::Link]);
+    assert_eq!(sides(&study), [0.0]);
 }
 
 /// At the largest possible Stribeck velocity, friction does not fall: it is Coulomb friction at the level found.

@@ -198,9 +198,10 @@ impl Units<'_> {
             self.state(line, &effect.name, state, &names);
         }
         let (formula, of_kind) = match &effect.entry {
-            Entry::Force(formula) | Entry::Torque(formula) | Entry::Coupling(formula) => {
-                (formula, "N m")
-            }
+            Entry::Force(formula)
+            | Entry::Torque(formula)
+            | Entry::Coupling(formula)
+            | Entry::Transmission(formula) => (formula, "N m"),
             Entry::Angle(formula) | Entry::Reading(formula) | Entry::Friction(formula) => {
                 (formula, "1")
             }
@@ -225,13 +226,9 @@ impl Units<'_> {
             return;
         };
         let what = |formula: &str| format!("{formula} of the state `{}` of {effect}", state.name);
-        self.fit(
-            &what("the rate"),
-            &state.rate,
-            line,
-            own.over(unit("s")),
-            names,
-        );
+        if let Some(rate) = &state.rate {
+            self.fit(&what("the rate"), rate, line, own.over(unit("s")), names);
+        }
         for end in state.within.iter().flatten() {
             self.fit(&what("an end"), end, line, own, names);
         }

@@ -188,7 +188,6 @@ fn differences(model: &Model, balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec
         ..logged.clone()
     };
     let internal = internal_along(&Point::from(&*in_log), log, &commands);
-    let internal: Vec<&[f64]> = internal.iter().map(Vec::as_slice).collect();
     let internal = smoothing.sampled_in(&smoothing.whole(), &internal);
     let found = balance_of(&in_log, &acting, &internal);
     (model.with_drive_torques(log, logged), found)
