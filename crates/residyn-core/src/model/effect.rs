@@ -136,7 +136,7 @@ pub enum Entry {
     /// A point mass on the last body of a chain, at the parameters x, y, z in that body's frame.
     Payload(Formula),
     /// The torque that passes from a motor with an inertia of its own to the link. The motor's torque is that after all
-    /// effects on the torque; the parameters of [`SIDES`] say on which side the sensor and friction are.
+    /// effects on the torque; the parameters `sensor` and `friction` say on which side both are.
     Transmission(Formula),
 }
 
@@ -333,7 +333,8 @@ impl Effect {
                 Side::Link => 0.0,
                 Side::Motor => 1.0,
             };
-            sensor.expect("checked when the file was read").starts = vec![value];
+            let sensor = sensor.expect("checked when the file was read");
+            (sensor.starts, sensor.bounds) = (vec![value], [value; 2]);
         }
         self
     }

@@ -122,8 +122,8 @@ fn in_place_of(
     Some(carried.unwrap_or(absent))
 }
 
-/// An effect with the searched whole numbers next to its present one: where it starts from absent if some value switches it
-/// off, else at its other values.
+/// An effect with the searched whole numbers next to its present one, or the ends of the range of one with a single start:
+/// where it starts from absent if some value switches it off, else at its other values.
 fn with_numbers_beside(
     problem: &Problem<'_>,
     rest: &Fitted,
@@ -135,7 +135,10 @@ fn with_numbers_beside(
             continue;
         }
         let own = old.values[k].0;
-        let numbers = || parameter.starts.iter().copied();
+        let numbers = || match parameter.starts.as_slice() {
+            [_] => parameter.bounds.iter().copied(),
+            starts => starts.iter().copied(),
+        };
         let below = numbers().filter(|number| *number < own).reduce(f64::max);
         let above = numbers().filter(|number| *number > own).reduce(f64::min);
         for number in below.into_iter().chain(above) {
