@@ -35,10 +35,11 @@ impl ErrorModel {
             // On several joints a search over transmissions outlasts its time.
             Self::OutputError => {
                 effect.shows_in == ShowsIn::Any
-                    && (declared.joints == 1 || !matches!(effect.entry, Entry::Transmission(_)))
+                    && (declared.joints == 1 || !effect.is_transmission())
             }
             Self::InverseDynamics => {
-                !matches!(effect.entry, Entry::Reading(_) | Entry::Transmission(_))
+                !matches!(effect.entry, Entry::Reading(_))
+                    && !effect.is_transmission()
                     && (effect.distinguishes_command()
                         || declared.knows_law() && effect.limits_command())
                     && (effect.shows_in != ShowsIn::LawTorques

@@ -36,8 +36,9 @@ pub struct Problem<'a> {
     pub top_speed: Vec<f64>,
     pub top_torque: Vec<f64>,
     pub top_driving: Vec<f64>,
-    /// What the declared equations give each joint, kg m^2 or kg.
-    pub(super) inertias: Vec<f64>,
+    /// What the declared equations give each joint, kg m^2 or kg, worked out on first use: of many joints it takes long, and
+    /// few effects ask.
+    pub(super) inertias: Arc<OnceLock<Vec<f64>>>,
     pub shooting: Shooting<'a>,
     /// A few of its windows, spread evenly, for comparing starting points.
     pub sample: Sample<'a>,
@@ -145,7 +146,7 @@ impl<'a> Problem<'a> {
             top_speed,
             top_torque,
             top_driving,
-            inertias: declared.joint_inertias(),
+            inertias: Arc::default(),
             first: None,
             usual: Arc::default(),
             moved_to: Vec::new(),
@@ -180,7 +181,7 @@ impl<'a> Problem<'a> {
             reversal: self.smoothing_velocities[joint],
             top_speed: self.top_speed[joint],
             top_torque: self.top_torque[joint],
-            inertia: self.inertias[joint],
+            inertia: &|| self.inertias.get_or_init(|| self.declared.joint_inertias())[joint],
             duration_s: durations.fold(0.0, f64::max),
         });
         match &self.declared.sides {

@@ -25,7 +25,7 @@ pub enum Local {
 ///
 /// Outputs: the n accelerations and the rates of the internal states; per joint the derivatives of its acceleration with
 /// respect to all states; per active parameter, and per force if forces are free, the derivatives of all these slopes; then
-/// those of the internal states' rates that `internal_rows` places. dq/dt = qd is assumed. Of a
+/// those that `rates_by_state` and `by_start` place. dq/dt = qd is assumed. Of a
 /// torque balance: the n differences, then for each difference its derivatives with respect to the active parameters that
 /// it depends on. Inputs: those of the model, with the derivatives of the torques with respect to filter parameters, and
 /// in a torque balance those of the internal states with respect to parameters, inserted before its parameters.
@@ -43,23 +43,18 @@ pub(super) struct Tangent {
     pub first_parameter: usize,
     /// Indices into the model's parameters.
     pub active: Vec<usize>,
-    /// The derivatives of each internal state's rate that are not zero.
-    internal_rows: Vec<InternalRow>,
-    /// Those of each acceleration with respect to internal states at the step's start.
-    accelerations_by_start: Vec<Vec<(usize, usize)>>,
+    /// The derivatives of each internal state's rate with respect to states.
+    rates_by_state: Vec<Sparse>,
+    /// Those of each acceleration, then of each of these rates, with respect to internal states at the step's start.
+    by_start: Vec<Sparse>,
     /// For a torque balance, the columns that each joint's difference depends on; else empty.
     pub columns_of: Vec<Vec<usize>>,
     /// Number of free values of one window.
     start_states: usize,
 }
 
-/// Derivatives of the rate of an internal state that are not zero, by the state that they are with respect to: each with its
-/// output.
-#[derive(Default)]
-struct InternalRow {
-    by_state: Vec<(usize, usize)>,
-    by_start: Vec<(usize, usize)>,
-}
+/// The derivatives of a slope that are not zero: the state that each is with respect to, and its output.
+type Sparse = Vec<(usize, usize)>;
 
 impl Tangent {
     pub fn new(dynamics: &Dynamics, active: &[usize], local: Local) -> Self {
@@ -88,15 +83,15 @@ impl Tangent {
         };
         let Compiled {
             program,
-            internal_rows,
-            accelerations_by_start,
+            rates_by_state,
+            by_start,
             columns_of,
         } = compiled;
         Self {
             program,
             reading,
-            internal_rows,
-            accelerations_by_start,
+            rates_by_state,
+            by_start,
             internal,
             joints: n,
             layout,
@@ -143,7 +138,7 @@ impl Tangent {
 
     /// The output with the derivative of an internal state's rate with respect to a state, unless it is zero.
     pub fn rate_by_state(&self, internal: usize, state: usize) -> Option<usize> {
-        let mut row = self.internal_rows[internal].by_state.iter();
+        let mut row = self.rates_by_state[internal].iter();
         row.find(|(own, _)| *own == state)
             .map(|(_, output)| *output)
     }
@@ -163,8 +158,8 @@ impl Tangent {
 /// A program of [`Tangent`] with the places of its outputs.
 struct Compiled {
     program: Program,
-    internal_rows: Vec<InternalRow>,
-    accelerations_by_start: Vec<Vec<(usize, usize)>>,
+    rates_by_state: Vec<Sparse>,
+    by_start: Vec<Sparse>,
     columns_of: Vec<Vec<usize>>,
 }
 
@@ -259,7 +254,6 @@ impl<'d> Differentiated<'d> {
         let others = states.end..states.end + active.len() + forces.len();
         let others = others.flat_map(|k| jacobian.iter().map(move |row| &row[k]));
         let of_starts = (self.graph).jacobian(&slopes, &self.inputs[layout.starts()]);
-        let (joints_by_start, internal_by_start) = of_starts.split_at(self.dynamics.joints);
         let all = slopes.iter().chain(by_states).chain(others);
         let mut all: Vec<Node> = all.copied().collect();
         let mut placed = |row: &[Node], first: usize| {
@@ -272,18 +266,16 @@ impl<'d> Differentiated<'d> {
             }
             places
         };
-        let rows = of_internal.iter().zip(internal_by_start);
-        let internal_rows = rows.map(|(by_state, by_start)| InternalRow {
-            by_state: placed(&by_state[states.clone()], 0),
-            by_start: placed(by_start, layout.internal().start),
-        });
-        let internal_rows = internal_rows.collect();
-        let of_joints = joints_by_start.iter();
+        let rates_by_state = of_internal
+            .iter()
+            .map(|row| placed(&row[states.clone()], 0));
+        let rates_by_state = rates_by_state.collect();
+        let by_start = of_starts
+            .iter()
+            .map(|row| placed(row, layout.internal().start));
         Compiled {
-            internal_rows,
-            accelerations_by_start: of_joints
-                .map(|by_start| placed(by_start, layout.internal().start))
-                .collect(),
+            rates_by_state,
+            by_start: by_start.collect(),
             program: self.graph.finish(&all),
             columns_of: Vec::new(),
         }
@@ -305,8 +297,8 @@ impl<'d> Differentiated<'d> {
         let outputs: Vec<Node> = differences.into_iter().chain(slopes).collect();
         Compiled {
             program: self.graph.finish(&outputs),
-            internal_rows: Vec::new(),
-            accelerations_by_start: Vec::new(),
+            rates_by_state: Vec::new(),
+            by_start: Vec::new(),
             columns_of,
         }
     }
@@ -594,21 +586,16 @@ impl<'t> TangentStepper<'t> {
                                 let by_state = by_state[(row - n) * rows + state].get(simd, part);
                                 slope = by_state.mul_add(inner[state].get(simd, part), slope);
                             }
-                            if internal > 0 {
-                                for (state, output) in &self.tangent.accelerations_by_start[row - n]
-                                {
-                                    let by = self.tape.output(*output).get(simd, part);
-                                    slope = by.mul_add(now[*state].get(simd, part), slope);
-                                }
-                            }
                         } else if column > 0 {
-                            let InternalRow { by_state, by_start } =
-                                &self.tangent.internal_rows[row - 2 * n];
-                            for (of, values) in [(by_state, inner), (by_start, now)] {
-                                for (state, output) in of {
-                                    let by = self.tape.output(*output).get(simd, part);
-                                    slope = by.mul_add(values[*state].get(simd, part), slope);
-                                }
+                            for (state, output) in &self.tangent.rates_by_state[row - 2 * n] {
+                                let by = self.tape.output(*output).get(simd, part);
+                                slope = by.mul_add(inner[*state].get(simd, part), slope);
+                            }
+                        }
+                        if column > 0 && internal > 0 {
+                            for (state, output) in &self.tangent.by_start[row - n] {
+                                let by = self.tape.output(*output).get(simd, part);
+                                slope = by.mul_add(now[*state].get(simd, part), slope);
                             }
                         }
                         slope

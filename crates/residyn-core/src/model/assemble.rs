@@ -460,12 +460,12 @@ impl<'a> Assembly<'a> {
 
     fn apply_forces(&mut self) {
         // All forces see the torque as it was before any of them.
-        let forces: Vec<(Joint, Node, bool)> = self
+        let forces: Vec<(&FittedEffect, Node)> = self
             .entries(|effect| matches!(effect.entry, Entry::Force(_)))
             .into_iter()
-            .map(|(index, joint, formula)| {
-                let is_friction = self.effects[index].effect.effect.is_friction();
-                (joint, self.effect_node(index, formula), is_friction)
+            .map(|(index, _, formula)| {
+                let effect = self.effects[index].effect;
+                (effect, self.effect_node(index, formula))
             })
             .collect();
         let shares: Vec<(Joint, Node)> = (self
@@ -473,13 +473,13 @@ impl<'a> Assembly<'a> {
             .into_iter())
         .map(|(index, joint, formula)| (joint, self.effect_node(index, formula)))
         .collect();
-        for (joint, mut force, is_friction) in forces {
-            if is_friction {
-                for (_, share) in shares.iter().filter(|(own, _)| *own == joint) {
+        for (effect, mut force) in forces {
+            if effect.effect.is_friction() {
+                for (_, share) in shares.iter().filter(|(own, _)| *own == effect.joint) {
                     force = self.graph.mul(force, *share);
                 }
             }
-            self.add_force(joint, force, is_friction);
+            self.add_force(effect, force);
         }
         for coupling in self.couplings() {
             for (joint, share) in coupling.shares {
@@ -580,10 +580,9 @@ impl<'a> Assembly<'a> {
         } = &self.effects[index];
         let joint = effect.joint;
         let mut scope = Scope::new(self.sign[joint]);
-        let mut motors = self.motors.iter();
-        let motor = motors.find(|motor| motor.joint == joint && motor.has_friction);
-        let of_motor = motor.filter(|_| effect.effect.is_friction());
-        let [q, qd] = of_motor.map_or([self.q[joint], self.qd[joint]], |motor| motor.motion);
+        let of_link = [self.q[joint], self.qd[joint]];
+        let motor = self.motor_under(effect);
+        let [q, qd] = motor.map_or(of_link, |motor| self.motors[motor].motion);
         scope.bind("q", q);
         scope.bind("qd", qd);
         scope.bind("tau", self.tau[joint]);

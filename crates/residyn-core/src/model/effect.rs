@@ -213,16 +213,16 @@ pub enum Measure {
 }
 
 /// How far the logs of a joint reach.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Logged {
+#[derive(Clone, Copy)]
+pub struct Logged<'a> {
     /// The speed over which dry friction reverses, rad/s or m/s.
     pub reversal: f64,
     /// The highest speed, rad/s or m/s.
     pub top_speed: f64,
     /// The highest torque, N m or N.
     pub top_torque: f64,
-    /// The inertia in the declared equations, kg m^2 or kg.
-    pub inertia: f64,
+    /// The inertia in the declared equations, kg m^2 or kg, for effects that ask.
+    pub inertia: &'a dyn Fn() -> f64,
     /// The length of the longest log, s.
     pub duration_s: f64,
 }
@@ -421,7 +421,7 @@ impl Effect {
     /// The same effect with bounds and starting values in the parameters' own units, for a joint in its logs. Dry friction
     /// has no other shape within its reversal: no speed at which it changes is lower.
     #[must_use]
-    pub fn measured_by(&self, logged: &Logged) -> Self {
+    pub fn measured_by(&self, logged: &Logged<'_>) -> Self {
         let is_dry = (self.entry.formula()).is_some_and(|formula| formula.calls("sign"));
         let slowest = if is_dry { logged.reversal } else { 0.0 };
         let mut effect = self.clone();
@@ -430,7 +430,7 @@ impl Effect {
                 Measure::One => (None, 1.0),
                 Measure::Speed => (Some(slowest), logged.top_speed),
                 Measure::Torque => (None, logged.top_torque),
-                Measure::Inertia => (None, logged.inertia),
+                Measure::Inertia => (None, (logged.inertia)()),
                 Measure::Duration => (None, logged.duration_s),
             };
             let multiples = parameter.bounds.iter_mut().chain(&mut parameter.starts);
@@ -684,7 +684,7 @@ mod tests {
                 reversal,
                 top_speed: 10.0,
                 top_torque: 1.0,
-                inertia: 0.1,
+                inertia: &|| 0.1,
                 duration_s: 20.0,
             });
             let mut parameters = measured.parameters.into_iter();

@@ -9,12 +9,13 @@ use std::ops::Range;
 use super::{Assembly, lower};
 use crate::data::Joint;
 use crate::expr::Node;
+use crate::model::FittedEffect;
 use crate::model::effect::{Effect, MOTOR_INERTIA, SIDES};
 use crate::model::internal_state::mean_of_two;
 
 /// A motor behind the transmission of its joint.
 pub(super) struct Motor {
-    pub joint: Joint,
+    joint: Joint,
     /// Its angle and its speed.
     pub motion: [Node; 2],
     inertia: Node,
@@ -28,7 +29,7 @@ pub(super) struct Motor {
     /// Whether the sensor is on the motor, not on the link.
     has_sensor: bool,
     /// Whether the friction of the joint is.
-    pub has_friction: bool,
+    has_friction: bool,
 }
 
 impl Assembly<'_> {
@@ -72,11 +73,19 @@ impl Assembly<'_> {
         }
     }
 
-    /// Add a force of the joint to the body that it acts on.
-    pub(super) fn add_force(&mut self, joint: Joint, force: Node, is_friction: bool) {
-        let mut motors = self.motors.iter_mut();
-        let motor = motors.find(|motor| motor.joint == joint && motor.has_friction && is_friction);
-        let tau = motor.map_or(&mut self.tau[joint], |motor| &mut motor.tau);
+    /// The motor on which an effect acts, if it is not the link: the friction of some joints.
+    pub(super) fn motor_under(&self, effect: &FittedEffect) -> Option<usize> {
+        let is_under = |motor: &Motor| motor.joint == effect.joint && motor.has_friction;
+        let motor = self.motors.iter().position(is_under);
+        motor.filter(|_| effect.effect.is_friction())
+    }
+
+    /// Add a force of an effect to the body that it acts on.
+    pub(super) fn add_force(&mut self, effect: &FittedEffect, force: Node) {
+        let tau = match self.motor_under(effect) {
+            Some(motor) => &mut self.motors[motor].tau,
+            None => &mut self.tau[effect.joint],
+        };
         *tau = self.graph.add(*tau, force);
     }
 
