@@ -337,6 +337,7 @@ fn every_effect_file_is_tested_here() {
         "thermal_friction",
         "cable_hysteresis",
         "joint_elasticity",
+        "motor_backlash",
     ];
     for effect in Library::built_in().effects() {
         let is_here = meaning(effect, &values(effect, 7), [0.0; 3]).is_some();

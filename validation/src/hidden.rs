@@ -129,19 +129,23 @@ impl Machine {
             "actuator_delay" => drive.delay = n("d")?,
             "actuator_lag" => drive.lag = n("T")?,
             "backlash" => self.transmissions[j] = Some(Transmission::backlash(n("delta")?)),
-            "joint_elasticity" => {
+            name @ ("joint_elasticity" | "motor_backlash") => {
                 if n("friction")? > 0.0 {
-                    return Err(
-                        "`joint_elasticity`: friction acts on the link, so `friction` must be 0"
-                            .into(),
-                    );
+                    return Err(format!(
+                        "`{name}`: friction acts on the link, so `friction` must be 0"
+                    ));
                 }
-                self.transmissions[j] = Some(Transmission {
-                    play: 0.0,
-                    stiffness: n("k")?,
-                    damping: n("d")?,
-                    inertia: n("J_m")?,
-                    has_encoder: n("sensor")? > 0.5,
+                let (inertia, has_encoder) = (n("J_m")?, n("sensor")? > 0.5);
+                self.transmissions[j] = Some(match name {
+                    "motor_backlash" => Transmission::with_play(n("delta")?, inertia, has_encoder),
+                    _ => Transmission {
+                        play: 0.0,
+                        stiffness: n("k")?,
+                        damping: n("d")?,
+                        inertia,
+                        has_encoder,
+                        is_lumped: false,
+                    },
                 });
             }
             "encoder_eccentricity" => self.eccentricity[j] = [n("e_s")?, n("e_c")?],
@@ -324,10 +328,16 @@ mod tests {
             let own = [("k", 30.0), ("d", 0.2), ("J_m", 0.01)];
             [own.as_slice(), &[("sensor", sensor), ("friction", 0.0)]].concat()
         };
+        let loose = |sensor: f64| {
+            let own = [("delta", 0.01), ("J_m", 0.01)];
+            [own.as_slice(), &[("sensor", sensor), ("friction", 0.0)]].concat()
+        };
         for (name, values, read) in [
             ("backlash", [("delta", 0.01)].as_slice(), 0.5),
             ("joint_elasticity", &soft(1.0), 0.5),
             ("joint_elasticity", &soft(0.0), 0.4),
+            ("motor_backlash", &loose(1.0), 0.5),
+            ("motor_backlash", &loose(0.0), 0.4),
         ] {
             let machine = Machine::bare(double_pendulum()).hiding(0, name, values);
             let mut state = State::at_rest([0.4, 0.3]);

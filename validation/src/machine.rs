@@ -100,7 +100,7 @@ impl Machine {
     pub fn declared(&self) -> BTreeMap<String, f64> {
         let gear = self.transmissions[0].as_ref();
         let motor = gear
-            .filter(|gear| gear.play > 0.0)
+            .filter(|gear| gear.is_lumped)
             .map_or(0.0, |gear| gear.inertia);
         self.mechanics.declared(self.rotor[0] + motor)
     }

@@ -12,6 +12,8 @@ pub struct Transmission {
     pub inertia: f64,
     /// Whether the encoder is on the motor, not on the link.
     pub has_encoder: bool,
+    /// Whether the motor counts as a part of its link, with which it turns on average: who hides the play says nothing of it.
+    pub is_lumped: bool,
 }
 
 /// Contact stiffness of a gear: half a milliradian under 1 N m.
@@ -22,14 +24,23 @@ const DAMPING_RATIO: f64 = 0.3;
 const ROTOR_INERTIA: f64 = 0.002;
 
 impl Transmission {
-    /// Two-sided play of `play` rad.
+    /// Two-sided play of `play` rad behind a small motor.
     pub fn backlash(play: f64) -> Self {
+        Self {
+            is_lumped: true,
+            ..Self::with_play(play, ROTOR_INERTIA, true)
+        }
+    }
+
+    /// Two-sided play of `play` rad behind a motor of this inertia.
+    pub fn with_play(play: f64, inertia: f64, has_encoder: bool) -> Self {
         Self {
             play,
             stiffness: CONTACT_STIFFNESS,
-            damping: 2.0 * DAMPING_RATIO * (CONTACT_STIFFNESS * ROTOR_INERTIA).sqrt(),
-            inertia: ROTOR_INERTIA,
-            has_encoder: true,
+            damping: 2.0 * DAMPING_RATIO * (CONTACT_STIFFNESS * inertia).sqrt(),
+            inertia,
+            has_encoder,
+            is_lumped: false,
         }
     }
 
@@ -70,6 +81,7 @@ mod tests {
             damping: 0.2,
             inertia: 0.01,
             has_encoder: true,
+            is_lumped: false,
         };
         assert!((shaft.torque(0.1, 0.0) - 3.0).abs() < 1e-12);
         assert!((shaft.torque(0.1, -1.0) - 2.8).abs() < 1e-12);

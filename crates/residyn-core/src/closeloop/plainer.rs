@@ -41,8 +41,8 @@ impl Unused {
     }
 }
 
-/// The model without one of the chosen effects, with the usual friction, with the effects that most machines have, or the
-/// declared one, if it predicts whole logs better than the chosen one: those left out of a fit of the others in turn, and
+/// The model without a transmission that is not established; or the one without one of the chosen effects, with the usual
+/// friction, with the effects that most machines have, or the declared one, if it predicts whole logs better than the chosen one: those left out of a fit of the others in turn, and
 /// those set `apart`, to which nothing is fitted. The search compares short windows of logs that it knows.
 pub(super) fn plainer(
     problem: &Problem<'_>,
@@ -62,6 +62,9 @@ pub(super) fn plainer(
                 why: "they raise the error on the logs set apart".into(),
             },
         });
+    }
+    if let Some(plainer) = without_doubtful_body(chosen) {
+        return Some(plainer);
     }
     let settings = &problem.settings.select;
     let least = LeftOut::of(problem, after, apart);
@@ -123,6 +126,21 @@ pub(super) fn plainer(
                 best.of,
                 100.0 * (1.0 - (-gain).exp())
             ),
+        },
+    })
+}
+
+/// The model without a transmission that is not established: with a body and a resonance more, a fit bends to whatever is
+/// missing.
+fn without_doubtful_body(chosen: &Chosen) -> Option<Plainer> {
+    let mut bodies = chosen.standings.iter();
+    let doubtful = bodies
+        .find(|standing| standing.effect.effect.is_transmission() && standing.reason.is_some())?;
+    Some(Plainer {
+        fitted: doubtful.without.clone().ok()?,
+        unused: Unused {
+            effect: Some(doubtful.effect.clone()),
+            why: doubtful.reason.clone()?,
         },
     })
 }

@@ -25,7 +25,7 @@ pub enum Local {
 ///
 /// Outputs: the n accelerations and the rates of the internal states; per joint the derivatives of its acceleration with
 /// respect to all states; per active parameter, and per force if forces are free, the derivatives of all these slopes; then
-/// those that `rates_by_state` and `by_start` place. dq/dt = qd is assumed. Of a
+/// those that `rates_by_state` and `by_start` place. dq/dt is qd, or that and a jump: the jumps follow the rates. Of a
 /// torque balance: the n differences, then for each difference its derivatives with respect to the active parameters that
 /// it depends on. Inputs: those of the model, with the derivatives of the torques with respect to filter parameters, and
 /// in a torque balance those of the internal states with respect to parameters, inserted before its parameters.
@@ -43,10 +43,13 @@ pub(super) struct Tangent {
     pub first_parameter: usize,
     /// Indices into the model's parameters.
     pub active: Vec<usize>,
-    /// The derivatives of each internal state's rate with respect to states.
+    /// The derivatives of each internal state's rate, then of each jump, with respect to states.
     rates_by_state: Vec<Sparse>,
-    /// Those of each acceleration, then of each of these rates, with respect to internal states at the step's start.
+    /// Those of each acceleration, then of each of these rates and jumps, with respect to internal states at the step's
+    /// start.
     by_start: Vec<Sparse>,
+    /// Whether angles have rates beyond their velocities.
+    has_jumps: bool,
     /// For a torque balance, the columns that each joint's difference depends on; else empty.
     pub columns_of: Vec<Vec<usize>>,
     /// Number of free values of one window.
@@ -85,6 +88,7 @@ impl Tangent {
             program,
             rates_by_state,
             by_start,
+            has_jumps,
             columns_of,
         } = compiled;
         Self {
@@ -92,6 +96,7 @@ impl Tangent {
             reading,
             rates_by_state,
             by_start,
+            has_jumps,
             internal,
             joints: n,
             layout,
@@ -126,9 +131,12 @@ impl Tangent {
         self.layout.states().len()
     }
 
-    /// Number of slopes that the program gives: accelerations, and rates of internal states.
+    /// Number of slopes that the program gives: accelerations, rates of internal states, and jumps.
     fn slope_count(&self) -> usize {
-        self.states() - self.joints
+        match self.has_jumps {
+            true => self.states(),
+            false => self.states() - self.joints,
+        }
     }
 
     /// The output with the derivative of a joint's acceleration with respect to a state.
@@ -160,6 +168,7 @@ struct Compiled {
     program: Program,
     rates_by_state: Vec<Sparse>,
     by_start: Vec<Sparse>,
+    has_jumps: bool,
     columns_of: Vec<Vec<usize>>,
 }
 
@@ -245,8 +254,14 @@ impl<'d> Differentiated<'d> {
 
     /// The program of [`Tangent`] for a motion; no difference of torques depends on a column.
     fn of_motion(mut self, active: &[usize], forces: Range<usize>) -> Compiled {
-        let slopes = self.outputs.split_off(self.dynamics.joints);
+        let mut slopes = self.outputs.split_off(self.dynamics.joints);
         let layout = self.dynamics.layout();
+        let velocities = &self.inputs[layout.velocities()];
+        let has_jumps = self.outputs != velocities;
+        if has_jumps {
+            let both = self.outputs.iter().zip(velocities);
+            slopes.extend(both.map(|(rate, velocity)| self.graph.sub(*rate, *velocity)));
+        }
         let states = layout.states();
         let jacobian = self.jacobian(&slopes, states.clone(), active, forces.clone());
         let (of_joints, of_internal) = jacobian.split_at(self.dynamics.joints);
@@ -276,6 +291,7 @@ impl<'d> Differentiated<'d> {
         Compiled {
             rates_by_state,
             by_start: by_start.collect(),
+            has_jumps,
             program: self.graph.finish(&all),
             columns_of: Vec::new(),
         }
@@ -299,6 +315,7 @@ impl<'d> Differentiated<'d> {
             program: self.graph.finish(&outputs),
             rates_by_state: Vec::new(),
             by_start: Vec::new(),
+            has_jumps: false,
             columns_of,
         }
     }
@@ -569,37 +586,42 @@ impl<'t> TangentStepper<'t> {
             .zip(self.next.chunks_exact_mut(rows))
             .zip(self.sum.chunks_exact_mut(rows));
         let by_state = &self.by_state[..n * rows];
+        let has_jumps = internal > 0 && self.tangent.has_jumps;
         for (column, (((now, inner), next), sum)) in columns.enumerate() {
             let direct = self.tangent.direct(column);
             for part in 0..Lane::parts::<S>() {
                 let (weighed, reached) = (weighed.get(simd, part), reached.get(simd, part));
                 for row in 0..rows {
-                    let slope = if row < n {
-                        inner[n + row].get(simd, part)
-                    } else {
-                        let mut slope = match direct {
-                            Some(first) => self.tape.output(first + row - n).get(simd, part),
-                            None => weighed.like(0.0),
-                        };
-                        if column > 0 && row < 2 * n {
+                    // Among the slopes: jumps are the last.
+                    let place = if row < n { rows + row } else { row } - n;
+                    let own = |first: usize| self.tape.output(first + place).get(simd, part);
+                    let mut slope = match (row < n, direct) {
+                        (true, Some(first)) if has_jumps => {
+                            inner[n + row].get(simd, part) + own(first)
+                        }
+                        (true, _) => inner[n + row].get(simd, part),
+                        (false, Some(first)) => own(first),
+                        (false, None) => weighed.like(0.0),
+                    };
+                    if row >= n || has_jumps {
+                        if column > 0 && place < n {
                             for state in 0..rows {
-                                let by_state = by_state[(row - n) * rows + state].get(simd, part);
+                                let by_state = by_state[place * rows + state].get(simd, part);
                                 slope = by_state.mul_add(inner[state].get(simd, part), slope);
                             }
                         } else if column > 0 {
-                            for (state, output) in &self.tangent.rates_by_state[row - 2 * n] {
+                            for (state, output) in &self.tangent.rates_by_state[place - n] {
                                 let by = self.tape.output(*output).get(simd, part);
                                 slope = by.mul_add(inner[*state].get(simd, part), slope);
                             }
                         }
                         if column > 0 && internal > 0 {
-                            for (state, output) in &self.tangent.by_start[row - n] {
+                            for (state, output) in &self.tangent.by_start[place] {
                                 let by = self.tape.output(*output).get(simd, part);
                                 slope = by.mul_add(now[*state].get(simd, part), slope);
                             }
                         }
-                        slope
-                    };
+                    }
                     let now = now[row].get(simd, part);
                     let before = if is_first {
                         now
@@ -649,7 +671,7 @@ mod tests {
     use super::{LANES, Local, Tangent, TangentStepper};
     use crate::data::Joint;
     use crate::lanes::Row;
-    use crate::model::{Dependence, Dynamics, FittedEffect, Library, elastic, viscous};
+    use crate::model::{Dependence, Dynamics, FittedEffect, Library, elastic, loose, viscous};
     use crate::sim::bristles;
     use crate::sim::{Commands, Hold, InternalStart, Point, RK4, SCHEMES, Scheme, Simulator};
 
@@ -755,6 +777,19 @@ mod tests {
             ]);
             let model = model.dynamics();
             assert_eq!(model.states(), 8);
+            for scheme in SCHEMES {
+                are_slopes(&model, [0.7, -0.4, 1.5, -2.0], 20, scheme);
+            }
+        }
+    }
+
+    /// The second motor meets its link within the time that is compared.
+    #[test]
+    fn sensitivities_of_joints_with_play_are_the_slopes_of_every_schemes_steps() {
+        let acrobot = Library::built_in().model("acrobot").unwrap();
+        for sides in [[0.0, 1.0], [1.0, 0.0]] {
+            let effects = [viscous(Joint::at(0)), loose(Joint::at(1), sides)];
+            let model = acrobot.with_effects(effects.to_vec()).dynamics();
             for scheme in SCHEMES {
                 are_slopes(&model, [0.7, -0.4, 1.5, -2.0], 20, scheme);
             }

@@ -1,6 +1,6 @@
 mod transmission;
 #[cfg(test)]
-pub(crate) use transmission::tests::{elastic, viscous};
+pub(crate) use transmission::tests::{elastic, loose, viscous};
 
 use std::ops::Range;
 

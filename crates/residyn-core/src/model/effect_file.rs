@@ -33,8 +33,9 @@ impl Effect {
         let names_of_states: Vec<&str> = states.iter().map(|(name, _)| name.as_str()).collect();
         let entry = entry(&mut table, &parameters, &names_of_states)?;
         let mut states = internal_states(states, &entry, &parameters)?;
+        let twist_within = twist_within(&mut table, &entry, &parameters)?;
         if let Entry::Transmission(_) = entry {
-            states = InternalState::of_transmission().to_vec();
+            states = InternalState::of_transmission(twist_within).to_vec();
         }
         if let Some(condition) = &table.valid_if {
             (table.section).check_names("valid_if", &condition.value, names(&parameters))?;
@@ -121,6 +122,27 @@ fn entry(
         None => Ok(entry),
         Some(name) => Err(section.error_at(key, format!("`{key}` needs a parameter `{name}`"))),
     }
+}
+
+/// The range of a transmission's twist.
+fn twist_within(
+    table: &mut EffectTable<'_>,
+    entry: &Entry,
+    parameters: &[EffectParameter],
+) -> Result<Option<[Formula; 2]>, FileError> {
+    let Some(ends) = table.twist_within.take() else {
+        return Ok(None);
+    };
+    let section = &table.section;
+    if !matches!(entry, Entry::Transmission(_)) {
+        let message =
+            "`twist_within` is the range of a transmission's twist: it goes with `transmission`";
+        return Err(section.error_at("twist_within", message));
+    }
+    for end in &ends {
+        section.check_names("twist_within", &end.value, names(parameters))?;
+    }
+    Ok(Some(ends.map(|end| end.value)))
 }
 
 /// The effect's own states, each with formulas in names that exist.

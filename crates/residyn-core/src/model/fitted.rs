@@ -42,6 +42,14 @@ pub struct FittedEffect {
     pub status: Option<Status>,
 }
 
+/// A state of an effect as its formula needs it: its name on its joint, and the outputs of the effect's program that are its
+/// rate and the ends of its range, if it has them.
+pub(super) struct PrintedState {
+    pub name: String,
+    pub rate: Option<usize>,
+    pub ends: Option<[usize; 2]>,
+}
+
 impl FittedEffect {
     /// The effect on a joint with all parameters zero.
     pub fn absent(effect: &Effect, joint: Joint) -> Self {
@@ -117,11 +125,11 @@ impl FittedEffect {
     pub fn expression(&self, names: &[String], driven_by: Quantity) -> String {
         match self.program(names) {
             Ok(program) => {
-                let state = |(name, [rate, low, high]): (String, [usize; 3])| {
-                    let [rate, low, high] = [rate, low, high].map(|k| program.formula(k));
-                    let within = format!(", {low} <= {name} <= {high}");
-                    let within = if low == high { String::new() } else { within };
-                    format!(", d{name}/dt = {rate}{within}")
+                let state = |PrintedState { name, rate, ends }| {
+                    let rate = rate.map(|k| format!(", d{name}/dt = {}", program.formula(k)));
+                    let ends = ends.map(|ends| ends.map(|k| program.formula(k)));
+                    let within = ends.map(|[low, high]| format!(", {low} <= {name} <= {high}"));
+                    rate.unwrap_or_default() + &within.unwrap_or_default()
                 };
                 let states = self.printed_states().map(state);
                 program.formula(0) + &states.collect::<String>()
@@ -130,12 +138,14 @@ impl FittedEffect {
         }
     }
 
-    /// The name of each state on its joint, with the outputs of its rate and of the ends of its range in the effect's
-    /// program.
-    pub(super) fn printed_states(&self) -> impl Iterator<Item = (String, [usize; 3])> {
+    /// What follows the formula, state by state.
+    pub(super) fn printed_states(&self) -> impl Iterator<Item = PrintedState> {
         let states = self.effect.states.iter().enumerate();
-        let printed = states.filter(|(_, state)| state.rate.is_some());
-        printed.map(|(k, state)| (self.joint.name(&state.name), [1, 2, 3].map(|of| 3 * k + of)))
+        states.map(|(k, state)| PrintedState {
+            name: self.joint.name(&state.name),
+            rate: state.rate.as_ref().map(|_| 3 * k + 1),
+            ends: state.within.as_ref().map(|_| [3 * k + 2, 3 * k + 3]),
+        })
     }
 
     /// The effect's formula as a program, followed by the rate of each of its states and the ends of the state's range,

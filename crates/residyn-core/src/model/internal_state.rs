@@ -97,21 +97,23 @@ impl InternalStates {
 const SHORTEST_S: f64 = 1e-9;
 
 impl InternalState {
-    /// By what a motor leads its link, and how fast that grows.
-    pub(super) fn of_transmission() -> [Self; 2] {
+    /// By what a motor leads its link, which may have ends, and how fast that grows.
+    pub(super) fn of_transmission(twist_within: Option<[Formula; 2]>) -> [Self; 2] {
         let [twist, twist_rate, _] = TRANSMISSION_NAMES;
         let states = [
             (twist, "rad", "angle by which the motor leads the link"),
             (twist_rate, "rad/s", "rate of the twist"),
         ];
-        states.map(|(name, unit, about)| Self {
+        let [mut twist, rate] = states.map(|(name, unit, about)| Self {
             name: name.to_owned(),
             unit: unit.to_owned(),
             about: about.to_owned(),
             rate: None,
             start: None,
             within: None,
-        })
+        });
+        twist.within = twist_within;
+        [twist, rate]
     }
 
     /// All of its formulas that may mention more than parameters.
@@ -130,11 +132,8 @@ impl InternalState {
         let Some(ends) = &self.within else {
             return mean;
         };
-        let [low, high] = ends.each_ref().map(|end| {
-            let end = lower(scope, graph, end);
-            let way = graph.sub(end, start);
-            graph.div(way, step)
-        });
+        let ends = ends.each_ref().map(|end| lower(scope, graph, end));
+        let [low, high] = means_to(graph, &ends, [start, step]);
         let raised = graph.binary(Binary::Max, mean, low);
         graph.binary(Binary::Min, raised, high)
     }
@@ -179,11 +178,23 @@ pub(super) fn mean_rates(
         }
         _ => unreachable!("checked when the file was read"),
     };
-    let shortest = graph.constant(SHORTEST_S);
-    let step = graph.binary(Binary::Max, step, shortest);
     let each = states.iter().zip(starts).zip(means);
     each.map(|((state, start), mean)| state.within_ends(graph, &scope, [*start, step], mean))
         .collect()
+}
+
+/// The mean rates with which a state that begins a step at `start` ends it at each of these values.
+pub(super) fn means_to<const N: usize>(
+    graph: &mut Graph,
+    ends: &[Node; N],
+    [start, step]: [Node; 2],
+) -> [Node; N] {
+    let shortest = graph.constant(SHORTEST_S);
+    let step = graph.binary(Binary::Max, step, shortest);
+    ends.map(|end| {
+        let way = graph.sub(end, start);
+        graph.div(way, step)
+    })
 }
 
 /// (1 - g/2) / (1 - g + g^2/2) times the rate, for the growth g over the step.

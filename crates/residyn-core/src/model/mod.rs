@@ -41,7 +41,7 @@ pub mod weights;
 mod written;
 
 #[cfg(test)]
-pub(crate) use assemble::{elastic, viscous};
+pub(crate) use assemble::{elastic, loose, viscous};
 pub use call::{Call, InputFile};
 pub use configuration::{Configuration, InLog};
 pub use dynamics::{Dynamics, Parameter, PerLogValue};

@@ -1,6 +1,6 @@
 use super::drive::Drive;
 use super::effect::Entry;
-use super::fitted::FittedEffect;
+use super::fitted::{FittedEffect, PrintedState};
 use super::reader::Located;
 use super::system::{Model, Motion};
 use crate::data::{Joint, Quantity};
@@ -74,12 +74,14 @@ impl FittedEffect {
     pub fn latex(&self, names: &[String], driven_by: Quantity) -> String {
         match self.program(names) {
             Ok(program) => {
-                let state = |(name, [rate, low, high]): (String, [usize; 3])| {
-                    let [rate, low, high] = [rate, low, high].map(|k| program.latex_formula(k));
+                let state = |PrintedState { name, rate, ends }| {
                     let name = latex_name(&name);
-                    let within = format!(",\\; {low} \\le {name} \\le {high}");
-                    let within = if low == high { String::new() } else { within };
-                    format!(",\\quad \\dot {{{name}}} = {rate}{within}")
+                    let formula = |k| program.latex_formula(k);
+                    let rate = rate.map(|k| format!(",\\quad \\dot {{{name}}} = {}", formula(k)));
+                    let within = ends.map(|[low, high]| {
+                        format!(",\\; {} \\le {name} \\le {}", formula(low), formula(high))
+                    });
+                    rate.unwrap_or_default() + &within.unwrap_or_default()
                 };
                 let states = self.printed_states().map(state);
                 program.latex_formula(0) + &states.collect::<String>()
