@@ -42,8 +42,9 @@ impl Unused {
 }
 
 /// The model without a transmission that is not established; or the one without one of the chosen effects, with the usual
-/// friction, with the effects that most machines have, or the declared one, if it predicts whole logs better than the chosen one: those left out of a fit of the others in turn, and
-/// those set `apart`, to which nothing is fitted. The search compares short windows of logs that it knows.
+/// friction, with the effects that most machines have, or the declared one, if it predicts whole logs better than the chosen
+/// one: those left out of a fit of the others in turn, and those set `apart`, to which nothing is fitted. The search compares
+/// short windows of logs that it knows.
 pub(super) fn plainer(
     problem: &Problem<'_>,
     declared: &Fitted,
@@ -133,15 +134,17 @@ pub(super) fn plainer(
 /// The model without a transmission that is not established: with a body and a resonance more, a fit bends to whatever is
 /// missing.
 fn without_doubtful_body(chosen: &Chosen) -> Option<Plainer> {
-    let mut bodies = chosen.standings.iter();
-    let doubtful = bodies
-        .find(|standing| standing.effect.effect.is_transmission() && standing.reason.is_some())?;
-    Some(Plainer {
-        fitted: doubtful.without.clone().ok()?,
-        unused: Unused {
-            effect: Some(doubtful.effect.clone()),
-            why: doubtful.reason.clone()?,
-        },
+    let standings = chosen.standings.iter();
+    let mut bodies = standings.filter(|standing| standing.effect.effect.is_transmission());
+    bodies.find_map(|standing| {
+        let why = standing.reason.clone()?;
+        Some(Plainer {
+            fitted: standing.without.clone().ok()?,
+            unused: Unused {
+                effect: Some(standing.effect.clone()),
+                why,
+            },
+        })
     })
 }
 

@@ -48,8 +48,6 @@ pub(super) struct Tangent {
     /// Those of each acceleration, then of each of these rates and jumps, with respect to internal states at the step's
     /// start.
     by_start: Vec<Sparse>,
-    /// Whether angles have rates beyond their velocities.
-    has_jumps: bool,
     /// For a torque balance, the columns that each joint's difference depends on; else empty.
     pub columns_of: Vec<Vec<usize>>,
     /// Number of free values of one window.
@@ -88,7 +86,6 @@ impl Tangent {
             program,
             rates_by_state,
             by_start,
-            has_jumps,
             columns_of,
         } = compiled;
         Self {
@@ -96,7 +93,6 @@ impl Tangent {
             reading,
             rates_by_state,
             by_start,
-            has_jumps,
             internal,
             joints: n,
             layout,
@@ -133,10 +129,12 @@ impl Tangent {
 
     /// Number of slopes that the program gives: accelerations, rates of internal states, and jumps.
     fn slope_count(&self) -> usize {
-        match self.has_jumps {
-            true => self.states(),
-            false => self.states() - self.joints,
-        }
+        self.by_start.len()
+    }
+
+    /// Whether angles have rates beyond their velocities.
+    fn has_jumps(&self) -> bool {
+        self.slope_count() == self.states()
     }
 
     /// The output with the derivative of a joint's acceleration with respect to a state.
@@ -168,7 +166,6 @@ struct Compiled {
     program: Program,
     rates_by_state: Vec<Sparse>,
     by_start: Vec<Sparse>,
-    has_jumps: bool,
     columns_of: Vec<Vec<usize>>,
 }
 
@@ -257,8 +254,7 @@ impl<'d> Differentiated<'d> {
         let mut slopes = self.outputs.split_off(self.dynamics.joints);
         let layout = self.dynamics.layout();
         let velocities = &self.inputs[layout.velocities()];
-        let has_jumps = self.outputs != velocities;
-        if has_jumps {
+        if self.outputs != velocities {
             let both = self.outputs.iter().zip(velocities);
             slopes.extend(both.map(|(rate, velocity)| self.graph.sub(*rate, *velocity)));
         }
@@ -291,7 +287,6 @@ impl<'d> Differentiated<'d> {
         Compiled {
             rates_by_state,
             by_start: by_start.collect(),
-            has_jumps,
             program: self.graph.finish(&all),
             columns_of: Vec::new(),
         }
@@ -315,7 +310,6 @@ impl<'d> Differentiated<'d> {
             program: self.graph.finish(&outputs),
             rates_by_state: Vec::new(),
             by_start: Vec::new(),
-            has_jumps: false,
             columns_of,
         }
     }
@@ -586,7 +580,7 @@ impl<'t> TangentStepper<'t> {
             .zip(self.next.chunks_exact_mut(rows))
             .zip(self.sum.chunks_exact_mut(rows));
         let by_state = &self.by_state[..n * rows];
-        let has_jumps = internal > 0 && self.tangent.has_jumps;
+        let has_jumps = internal > 0 && self.tangent.has_jumps();
         for (column, (((now, inner), next), sum)) in columns.enumerate() {
             let direct = self.tangent.direct(column);
             for part in 0..Lane::parts::<S>() {

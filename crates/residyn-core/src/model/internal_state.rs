@@ -133,9 +133,8 @@ impl InternalState {
             return mean;
         };
         let ends = ends.each_ref().map(|end| lower(scope, graph, end));
-        let [low, high] = means_to(graph, &ends, [start, step]);
-        let raised = graph.binary(Binary::Max, mean, low);
-        graph.binary(Binary::Min, raised, high)
+        let ends = means_to(graph, &ends, [start, step]);
+        between(graph, ends, mean)
     }
 
     /// Its value before a log begins.
@@ -195,6 +194,12 @@ pub(super) fn means_to<const N: usize>(
         let way = graph.sub(end, start);
         graph.div(way, step)
     })
+}
+
+/// What is nearest to a mean rate within these ends.
+pub(super) fn between(graph: &mut Graph, [low, high]: [Node; 2], mean: Node) -> Node {
+    let raised = graph.binary(Binary::Max, mean, low);
+    graph.binary(Binary::Min, raised, high)
 }
 
 /// (1 - g/2) / (1 - g + g^2/2) times the rate, for the growth g over the step.

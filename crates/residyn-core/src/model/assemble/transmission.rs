@@ -11,7 +11,7 @@ use crate::data::Joint;
 use crate::expr::{Binary, Graph, Node};
 use crate::model::FittedEffect;
 use crate::model::effect::{Effect, MOTOR_INERTIA, SIDES};
-use crate::model::internal_state::{mean_of_two, means_to};
+use crate::model::internal_state::{between, mean_of_two, means_to};
 
 /// A motor behind the transmission of its joint.
 pub(super) struct Motor {
@@ -212,8 +212,8 @@ impl Assembly<'_> {
 }
 
 /// The mean rates of a twist and of its rate over a step that ends within the twist's range: where it would leave it both
-/// bodies meet, and then move as one unless they part again. `ends` and `rest` are the mean rates with which the twist ends
-/// the step at an end of its range, and its rate at zero.
+/// bodies meet, and then move as one unless they part again. `low`, `high` and `rest` are the mean rates with which the twist
+/// ends the step at an end of its range, and its rate at zero.
 fn stopped(
     graph: &mut Graph,
     [mean, gained]: [Node; 2],
@@ -225,8 +225,7 @@ fn stopped(
     let [above, below] = [[mean, high], [low, mean]].map(|[more, less]| graph.sub(more, less));
     let gained = graph.select(above, slowed, gained);
     let gained = graph.select(below, raised, gained);
-    let mean = graph.binary(Binary::Min, mean, high);
-    [graph.binary(Binary::Max, mean, low), gained]
+    [between(graph, [low, high], mean), gained]
 }
 
 /// What a body that has this share in the relative motion moves over a step beyond the mean of its speeds at both ends, as a
@@ -361,8 +360,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// Contacts so stiff and so damped that they hardly give nor rebound. With friction on the motor, some meetings graze, of
-    /// which small differences decide.
+    /// Contacts so stiff and so damped that they hardly give or rebound. With friction on the motor a tenth of the play is left
+    /// at most, however short the steps: what decides is not known.
     #[test]
     fn a_joint_with_play_moves_like_two_bodies() {
         let pressed = "max(abs(q1 - q2) - 0.02, 0)";
