@@ -49,7 +49,8 @@ pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted, limit: f64) -> V
     sets
 }
 
-/// The effects of a model with all that may replace them.
+/// The effects of a model with all that may replace them. Transmissions replace each other alone: what they are confused with
+/// does not hide them where they are added, and explains less.
 fn swaps(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Swap> {
     let mut swaps = Vec::new();
     for place in problem.added(&fitted.model) {
@@ -57,7 +58,9 @@ fn swaps(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Swap> {
         let old = rest.remove(place);
         let is_like = |new: &&Effect| {
             let is_counted = new.parameters.iter().any(|parameter| parameter.whole);
-            old.effect.is_confused_with(new) || is_counted && new.name == old.effect.name
+            let is_another = old.effect.is_confused_with(new)
+                && old.effect.is_transmission() == new.is_transmission();
+            is_another || is_counted && new.name == old.effect.name
         };
         let like: Vec<Effect> = problem.effects().iter().filter(is_like).cloned().collect();
         let mut new = acting(problem, &like);

@@ -18,13 +18,22 @@ pub fn screen(
         let predicted = best_predicted(&screening, problem);
         sets = predicted.iter().map(|set| screening.effects(set)).collect();
     }
+    let unswitched = candidates.iter().filter(|c| !has_switch(c));
+    sets.extend(each_alone(problem, fitted, unswitched));
+    sets
+}
+
+/// The effects of a fitted model, beyond the declared ones, with each candidate alone at its best starting point.
+pub fn each_alone<'c>(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    candidates: impl IntoIterator<Item = &'c FittedEffect>,
+) -> Vec<Vec<FittedEffect>> {
     let declared = problem.declared.effects.len();
     let alone = |candidate: &FittedEffect| {
         let beside = beside(problem, fitted, candidate)?;
         let start = best_start(problem, &beside, candidate)?;
         Some([&beside.model.effects[declared..], &[start]].concat())
     };
-    let unswitched = candidates.iter().filter(|c| !has_switch(c));
-    sets.extend(unswitched.filter_map(alone));
-    sets
+    candidates.into_iter().filter_map(alone).collect()
 }

@@ -9,7 +9,7 @@ use super::exchange::{Exchange, exchanges};
 use super::identity::EffectId;
 use super::open_loop_check::OpenLoopCheck;
 use super::scale::at_other_scales;
-use super::screen::screen;
+use super::screen::{each_alone, screen};
 use super::screening::Screening;
 use super::sets::descent;
 use super::simpler::{repaired, simpler};
@@ -174,8 +174,7 @@ impl<'a> Search<'a> {
     fn next(&mut self, best: &Trial, passed: &[Vec<EffectId>]) -> Result<Option<Trial>, FitError> {
         let settings = &self.problem.settings.select;
         let added = self.better(best, settings.round_gain, Self::round);
-        let is_large =
-            |better: &Better| better.trial.loss() < best.loss() * (1.0 - settings.large_gain);
+        let is_large = |better: &Better| self.is_large_gain(&better.trial, best);
         // An exchange adds nothing, so it goes first, and a smaller gain will do.
         if !added.as_ref().is_some_and(is_large)
             && let Some(exchanged) = self.better(best, settings.exchange_gain, Self::exchanged)
@@ -266,14 +265,29 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Fit the sets with the largest predicted gain over a model, and return them best first.
+    /// Fit the sets with the largest predicted gain over a model, and return them best first. Transmissions, each of which
+    /// takes as long as all other effects together, are fitted only if none of those brings a large gain.
     fn round(&mut self, from: &Trial) -> Vec<Trial> {
-        let candidates = candidates(self.problem, &from.fitted.model.effects);
-        self.say(&format!("screening {} effects", candidates.len()));
-        let sets = screen(self.problem, &from.fitted, &candidates);
+        let problem = self.problem;
+        let candidates = candidates(problem, &from.fitted.model.effects);
+        let number = candidates.len();
+        let (transmissions, others): (Vec<_>, Vec<_>) =
+            (candidates.into_iter()).partition(|new| new.effect.is_transmission());
+        self.say(&format!("screening {} effects", others.len()));
+        let sets = screen(problem, &from.fitted, &others);
         self.say(&format!("fitting {} sets of effects", sets.len()));
-        let fitted = self.fitted_for_the_best(from, sets);
-        self.noted(from, fitted, candidates.len())
+        let mut fitted = self.fitted_for_the_best(from, sets);
+        let is_large = |trial: &Trial| self.is_large_gain(trial, from);
+        if !transmissions.is_empty() && !fitted.iter().any(is_large) {
+            self.say("fitting transmissions");
+            let sets = each_alone(problem, &from.fitted, &transmissions);
+            fitted.extend(self.fitted_for_the_best(from, sets));
+        }
+        self.noted(from, fitted, number)
+    }
+
+    fn is_large_gain(&self, trial: &Trial, from: &Trial) -> bool {
+        trial.loss() < from.loss() * (1.0 - self.problem.settings.select.large_gain)
     }
 
     /// The declared model with each set of effects in place of a trial's, the most promising first, fitted at the
