@@ -33,9 +33,9 @@ impl Effect {
         let names_of_states: Vec<&str> = states.iter().map(|(name, _)| name.as_str()).collect();
         let entry = entry(&mut table, &parameters, &names_of_states)?;
         let mut states = internal_states(states, &entry, &parameters)?;
-        let twist_within = twist_within(&mut table, &entry, &parameters)?;
+        let free_within = free_within(&mut table, &entry, &parameters)?;
         if let Entry::Transmission(_) = entry {
-            states = InternalState::of_transmission(twist_within).to_vec();
+            states = InternalState::of_transmission(free_within).to_vec();
         }
         if let Some(condition) = &table.valid_if {
             (table.section).check_names("valid_if", &condition.value, names(&parameters))?;
@@ -124,23 +124,22 @@ fn entry(
     }
 }
 
-/// The range of a transmission's twist.
-fn twist_within(
+/// The range of a transmission's twist in which nothing passes.
+fn free_within(
     table: &mut EffectTable<'_>,
     entry: &Entry,
     parameters: &[EffectParameter],
 ) -> Result<Option<[Formula; 2]>, FileError> {
-    let Some(ends) = table.twist_within.take() else {
+    let Some(ends) = table.free_within.take() else {
         return Ok(None);
     };
     let section = &table.section;
     if !matches!(entry, Entry::Transmission(_)) {
-        let message =
-            "`twist_within` is the range of a transmission's twist: it goes with `transmission`";
-        return Err(section.error_at("twist_within", message));
+        let message = "`free_within` is the play of a transmission, in which nothing passes: it goes with `transmission`";
+        return Err(section.error_at("free_within", message));
     }
     for end in &ends {
-        section.check_names("twist_within", &end.value, names(parameters))?;
+        section.check_names("free_within", &end.value, names(parameters))?;
     }
     Ok(Some(ends.map(|end| end.value)))
 }

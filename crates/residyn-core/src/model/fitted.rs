@@ -126,9 +126,12 @@ impl FittedEffect {
         match self.program(names) {
             Ok(program) => {
                 let state = |PrintedState { name, rate, ends }| {
-                    let rate = rate.map(|k| format!(", d{name}/dt = {}", program.formula(k)));
                     let ends = ends.map(|ends| ends.map(|k| program.formula(k)));
-                    let within = ends.map(|[low, high]| format!(", {low} <= {name} <= {high}"));
+                    let within = ends.map(|[low, high]| match rate {
+                        Some(_) => format!(", {low} <= {name} <= {high}"),
+                        None => format!(", {name} beyond {low} to {high}"),
+                    });
+                    let rate = rate.map(|k| format!(", d{name}/dt = {}", program.formula(k)));
                     rate.unwrap_or_default() + &within.unwrap_or_default()
                 };
                 let states = self.printed_states().map(state);

@@ -167,7 +167,7 @@ tables! {
         coupling: Option<Located<Formula>>,
         payload: Option<Located<Formula>>,
         transmission: Option<Located<Formula>>,
-        twist_within: Option<[Located<Formula>; 2]>,
+        free_within: Option<[Located<Formula>; 2]>,
         contains: Vec<String>,
         refines: bool,
         confused_with: Vec<String>,

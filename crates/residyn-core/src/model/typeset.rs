@@ -77,10 +77,14 @@ impl FittedEffect {
                 let state = |PrintedState { name, rate, ends }| {
                     let name = latex_name(&name);
                     let formula = |k| program.latex_formula(k);
-                    let rate = rate.map(|k| format!(",\\quad \\dot {{{name}}} = {}", formula(k)));
-                    let within = ends.map(|[low, high]| {
-                        format!(",\\; {} \\le {name} \\le {}", formula(low), formula(high))
+                    let within = ends.map(|ends| (ends.map(formula), rate));
+                    let within = within.map(|([low, high], rate)| match rate {
+                        Some(_) => format!(",\\; {low} \\le {name} \\le {high}"),
+                        None => {
+                            format!(",\\; {name} \\text{{ beyond }} {low} \\text{{ to }} {high}")
+                        }
                     });
+                    let rate = rate.map(|k| format!(",\\quad \\dot {{{name}}} = {}", formula(k)));
                     rate.unwrap_or_default() + &within.unwrap_or_default()
                 };
                 let states = self.printed_states().map(state);
