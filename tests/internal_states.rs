@@ -199,27 +199,17 @@ const MODEL: &str = "[system]\nname = \"rig\"\njoints = 1\n\n[parameters]\nc = {
     [dynamics]\nqdd1 = \"b * tau1 - c * sin(q1)\"\n\n\
     [[effect]]\nname = \"presliding\"\njoint = 1\nF_c = 0.12\nsigma_0 = 5.0\n";
 
+const RECIPE: &str = "model = \"rig.toml\"\nkind = \"physics\"\n[data]\nplant = \"rig.toml\"\ntrajectories = 4\nstep_s = 0.01\n\
+    position = [[-1, 1]]\nvelocity = [[-1, 1]]\ntorque = [[-1, 1]]\n";
+
 #[test]
 fn what_cannot_carry_states_says_so() {
     let scratch = Scratch::new();
     scratch.file("rig.toml", MODEL);
-    let says = |line: &str, what: &str| {
-        let refusal = scratch.refuses(line);
-        let wanted = format!(
-            "presliding on joint 1 of rig has states of its own, which {what} cannot have yet"
-        );
-        assert!(refusal.contains(&wanted), "{line}: {refusal}");
-    };
-    for format in ["c", "fmu", "fmu2", "json", "latex", "onnx", "python"] {
-        says(
-            &format!("export --model rig.toml --format {format} --out rig.out"),
-            "an exported file",
-        );
-    }
-    says(
-        "control --plant pendulum --model rig.toml --out run",
-        "a planner",
-    );
+    scratch.file("recipe.toml", RECIPE);
+    let refusal = scratch.refuses("train --config recipe.toml --out run");
+    let wanted = "presliding on joint 1 of rig has states of its own, which a model trained on a simulated plant cannot have yet";
+    assert!(refusal.contains(wanted), "{refusal}");
 }
 
 mod slow {

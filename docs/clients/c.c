@@ -1,6 +1,6 @@
 /* Predicts with an exported model. For a model of a pendulum:
 
-       cc -include pendulum.h '-DMODEL(name)=pendulum_##name' -DJOINTS=PENDULUM_JOINTS c.c -lm
+       cc -include pendulum.h '-DMODEL(name)=pendulum_##name' -DJOINTS=PENDULUM_JOINTS -DSTATES=PENDULUM_STATES c.c -lm
 
    Reads numbers: how many points and steps there are, the length of a step, state and torque of each point, a start,
    the torque of each step from there. Prints a line for each point, the state after a step and the derivative, and a
@@ -8,8 +8,6 @@
 
 #include <stdio.h>
 #include <stdlib.h>
-
-enum { STATES = 2 * JOINTS };
 
 static void get(MODEL(real) *numbers, int count)
 {

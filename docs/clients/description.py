@@ -36,10 +36,11 @@ def network(prefix, q, qd, torque):
     return x
 
 
-def derivative(state, torque, time):
-    """ds/dt of rows of states while torques act."""
+def derivative(state, torque, time, begun=None, length=0.0):
+    """ds/dt of rows of states while torques act; of states of effects the mean rates over a step from `begun`."""
+    of_effects = [*(state if begun is None else begun).T[2 * n :], length] if equations["states"] else []
     parameters = [weights[f"parameters.{p['name']}"] for p in model["parameters"]]
-    inputs = [*state.T, *torque.T, time, *parameters]
+    inputs = [*state.T, *torque.T, time, *of_effects, *parameters]
     values = []
     for name, *arguments in equations["operations"]:
         if name == "input":
@@ -50,8 +51,8 @@ def derivative(state, torque, time):
             values.append(FUNCTIONS[name](*(values[k] for k in arguments)))
     rates = np.stack([values[k] + np.zeros(len(state)) for k in equations["outputs"]], axis=-1)
     for prefix in equations["networks"]:
-        parts = network(prefix, state[:, :n], state[:, n:], torque)
-        rates[:, -parts.shape[1] :] += parts
+        parts = network(prefix, state[:, :n], state[:, n : 2 * n], torque)
+        rates[:, 2 * n - parts.shape[1] : 2 * n] += parts
     return rates
 
 
@@ -59,11 +60,11 @@ def advance(state, torque, time, h):
     """One substep: an explicit Runge-Kutta method whose stages each need the one before."""
     inner = end = state
     for after, reach, weight in equations["stages"]:
-        rates = derivative(inner, torque, time + after * h)
+        rates = derivative(inner, torque, time + after * h, state, h)
         end = end + weight * h * rates
         inner = state + reach * h * rates
     if equations["semi_implicit"]:
-        end[:, :n] += h * h * rates[:, n:]
+        end[:, :n] += h * h * rates[:, n : 2 * n]
     return end
 
 

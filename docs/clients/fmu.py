@@ -15,8 +15,10 @@ description = fmpy.read_model_description(path)
 folder = fmpy.extract(path)
 reference = {variable.name: variable.valueReference for variable in description.modelVariables}
 joints = [f"joint[{k + 1}]" for k in range(samples["joints"])]
-states = [reference[f"{joint}.{what}"] for what in ("position", "velocity") for joint in joints]
-rates = [reference[f"der({joint}.{what})"] for what in ("position", "velocity") for joint in joints]
+# Positions, velocities, then the states of effects.
+states = [output.variable.valueReference for output in description.outputs]
+rate_of = {rate.variable.derivative.valueReference: rate.variable.valueReference for rate in description.derivatives}
+rates = [rate_of[state] for state in states]
 kinds = ("torque", "force", "command")
 torques = [next(reference[v] for v in (f"{joint}.{k}" for k in kinds) if v in reference) for joint in joints]
 

@@ -27,6 +27,9 @@ def smooth_friction(_, data):
 if level.any():
     mujoco.set_mjcb_passive(smooth_friction)
 
+# States of effects are not carried, and stay at zero here.
+still = np.zeros(len(samples["start"]) - 2 * n)
+
 # Effort limits of the joints.
 limited = model.jnt_actfrclimited.astype(bool)
 least, most = (np.where(limited, bound, side) for bound, side in zip(model.jnt_actfrcrange.T, (-np.inf, np.inf)))
@@ -34,21 +37,21 @@ least, most = (np.where(limited, bound, side) for bound, side in zip(model.jnt_a
 
 def begin(state, torque):
     mujoco.mj_resetData(model, data)
-    data.qpos, data.qvel = state[:n], state[n:]
+    data.qpos, data.qvel = state[:n], state[n : 2 * n]
     data.qfrc_applied = np.clip(torque, least, most)
 
 
 def derivative(state, torque):
     begin(state, torque)
     mujoco.mj_forward(model, data)
-    return [*data.qvel, *data.qacc]
+    return [*data.qvel, *data.qacc, *still]
 
 
 def next_state(state, torque):
     begin(state, torque)
     for _ in range(round(samples["step_s"] / model.opt.timestep)):
         mujoco.mj_step(model, data)
-    return [*data.qpos, *data.qvel]
+    return [*data.qpos, *data.qvel, *still]
 
 
 points = list(zip(samples["states"], samples["torques"]))

@@ -208,7 +208,7 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
         }
         Source::File(file) => {
             let model = read_model(file, library)?;
-            model.stands_alone("a planner")?;
+            model.runs_without_logs("a planner")?;
             Ok(Predictor::of_equations(model.dynamics(), task.integrator))
         }
     }

@@ -21,9 +21,10 @@ assert np.allclose(rewards, expected["rewards"], rtol=1e-12, atol=1e-12), reward
 observation, _ = environment.reset(seed=3)
 action = np.array(expected["torques"][0])
 after, won, terminated, truncated, _ = environment.step(action)
-state, memory = observation, None
+state, memory = np.concatenate([observation, model.START[len(observation) :]]), None
 for _ in range(round(model.TASK["hold_s"] / model.STEP)):
     state, memory = model.step(state, action, memory)
+state = state[: len(after)]
 assert np.array_equal(after, state), (after, state)
 assert won == model.reward(after, action, model.TASK["hold_s"]) and not (terminated or truncated)
 again, _ = environment.reset(seed=3)

@@ -19,12 +19,12 @@ static int read(MODEL(real) *numbers, int count)
 int main(void)
 {
     const MODEL(parameters) parameters = MODEL(defaults)();
-    MODEL(real) state[2 * JOINTS], acceleration[JOINTS], torque[JOINTS], needed[JOINTS];
+    MODEL(real) state[STATES], acceleration[JOINTS], torque[JOINTS], needed[JOINTS];
     int motions, k, j;
     if (scanf("%d", &motions) != 1)
         return EXIT_FAILURE;
     for (k = 0; k < motions; k++) {
-        if (!read(state, 2 * JOINTS) || !read(acceleration, JOINTS) || !read(torque, JOINTS))
+        if (!read(state, STATES) || !read(acceleration, JOINTS) || !read(torque, JOINTS))
             return EXIT_FAILURE;
         MODEL(inverse_dynamics)(&parameters, state, acceleration, torque, 0, needed);
         for (j = 0; j < JOINTS; j++)

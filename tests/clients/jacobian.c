@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { STATES = 2 * JOINTS, COLUMNS = 3 * JOINTS };
+enum { COLUMNS = STATES + JOINTS };
 
 static const MODEL(real) NUDGE = 1e-6;
 
@@ -57,16 +57,20 @@ static double difference(void (*function)(const MODEL(real) *, MODEL(real), MODE
             scale[i] = fmax(scale[i], fabs(c < STATES ? by_state[i][c] : by_torque[i][c - STATES]));
     }
     for (c = 0; c < COLUMNS; c++) {
-        MODEL(real) above[STATES], below[STATES];
+        /* Five points: the curvature of a contact shows in three. */
+        MODEL(real) moved[4][STATES];
         const MODEL(real) here = at[c];
-        at[c] = here + NUDGE;
-        function(at, step, above);
-        at[c] = here - NUDGE;
-        function(at, step, below);
+        const int by[4] = {1, -1, 2, -2};
+        int k;
+        for (k = 0; k < 4; k++) {
+            at[c] = here + by[k] * NUDGE;
+            function(at, step, moved[k]);
+        }
         at[c] = here;
         for (i = 0; i < STATES; i++) {
             const double entry = c < STATES ? by_state[i][c] : by_torque[i][c - STATES];
-            const double off = fabs((above[i] - below[i]) / (2 * NUDGE) - entry) / scale[i];
+            const double near = moved[0][i] - moved[1][i], far = moved[2][i] - moved[3][i];
+            const double off = fabs((8 * near - far) / (12 * NUDGE) - entry) / scale[i];
             worst = off <= worst ? worst : off;
         }
     }

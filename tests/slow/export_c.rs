@@ -75,6 +75,7 @@ impl Header {
             self.path().to_string_lossy().into_owned(),
             format!("-DMODEL(name)={lower}_##name"),
             format!("-DJOINTS={upper}_JOINTS"),
+            format!("-DSTATES={upper}_STATES"),
             format!("-DPARTS={upper}_PARTS"),
         ]
     }
@@ -128,7 +129,8 @@ fn headers(tools: &[&str]) -> Vec<Header> {
         return Vec::new();
     }
     let odd = [("odd", odd())];
-    let all = exported_models::all().into_iter().chain(odd);
+    let loose = [exported_models::loose()];
+    let all = exported_models::all().into_iter().chain(loose).chain(odd);
     all.map(|(name, model)| written(name, model)).collect()
 }
 
@@ -163,7 +165,7 @@ fn predictions(header: &Header, flags: &[&str], samples: &Samples) -> Prediction
     let (next, derivative) = points
         .iter()
         .map(|row| {
-            let (next, derivative) = row.split_at(2 * samples.joints);
+            let (next, derivative) = row.split_at(samples.start.len());
             (next.to_vec(), derivative.to_vec())
         })
         .unzip();
@@ -282,7 +284,7 @@ fn exported_inverse_dynamics_needs_the_same_torques() {
                 .collect()
         };
         let motions: Vec<[Vec<f64>; 3]> = (0..100)
-            .map(|_| [draw(2 * n, 3.0), draw(n, 10.0), draw(n, 5.0)])
+            .map(|_| [draw(model.states(), 3.0), draw(n, 10.0), draw(n, 5.0)])
             .collect();
         let mut question = format!("{}", motions.len());
         for number in motions.iter().flatten().flatten() {

@@ -60,6 +60,60 @@ joint = 2
 m = 4.0
 "#;
 
+/// Friction that gives before it slips.
+const GIVING: &str = r#"
+[[effect]]
+name = "presliding"
+joint = 1
+F_c = 0.12
+sigma_0 = 5.0
+"#;
+
+/// A motor behind a soft spring.
+const ELASTIC: &str = r#"
+[[effect]]
+name = "joint_elasticity"
+joint = 1
+k = 20.0
+d = 0.3
+J_m = 0.05
+sensor = 0
+friction = 1
+"#;
+
+/// A motor with play.
+const LOOSE: &str = r#"
+[[effect]]
+name = "motor_backlash"
+joint = 1
+delta = 0.04
+k = 200
+zeta = 0.5
+J_m = 0.05
+sensor = 1
+friction = 0
+"#;
+
+/// Friction that gives on one joint, and that falls as it warms up on the other.
+const WARMING: &str = r#"
+[[effect]]
+name = "presliding"
+joint = 1
+F_c = 0.12
+sigma_0 = 5.0
+
+[[effect]]
+name = "coulomb_friction"
+joint = 2
+F_c = 0.1
+
+[[effect]]
+name = "thermal_friction"
+joint = 2
+a = 0.3
+T = 8.0
+"#;
+
 /// All models, by name.
 pub fn all() -> Vec<(&'static str, ExportModel)> {
     let fine = Integrator::fine(4.try_into().unwrap());
@@ -69,6 +123,8 @@ pub fn all() -> Vec<(&'static str, ExportModel)> {
     let friction = system("pendulum", PENDULUM_EFFECTS);
     let late = system("acrobot", ACROBOT_EFFECTS);
     let servo = system("servo", PENDULUM_EFFECTS);
+    let [giving, elastic] = [GIVING, ELASTIC].map(|effects| system("pendulum", effects));
+    let warming = system("acrobot", WARMING);
     let mut random = rng(7);
     let forces =
         [Angles::Raw, Angles::SinCos].map(|angles| settings(angles, ResidualOn::Accelerations));
@@ -76,6 +132,7 @@ pub fn all() -> Vec<(&'static str, ExportModel)> {
     let mut small = |joints, settings: &MlpSettings| network(joints, settings, &mut random);
     let [a, b, c] = [small(1, &rates), small(2, &forces[0]), small(2, &forces[1])];
     let [d, e] = [small(1, &forces[1]), small(2, &rates)];
+    let f = small(1, &forces[1]);
     let mut models = vec![
         ("pendulum", physics(&pendulum, euler, 0.02)),
         ("pendulum_effects", physics(&friction, rk4, 0.01)),
@@ -89,12 +146,24 @@ pub fn all() -> Vec<(&'static str, ExportModel)> {
         ("servo", physics(&servo, rk4, 0.01)),
         ("motor", physics(&motor, rk4, 0.01)),
         ("cartpole_hybrid", hybrid(&cartpole, b, rk4, 0.02)),
+        ("pendulum_elastic", physics(&elastic, rk4, 0.01)),
+        ("pendulum_giving", hybrid(&giving, f, euler, 0.01)),
+        ("acrobot_warming", physics(&warming, rk4, 0.01)),
     ];
     models.extend(SCHEMES.map(|scheme| {
         let integrator = Integrator::of(scheme);
         (scheme.name, physics(&acrobot, integrator, 0.02))
     }));
     models
+}
+
+/// A motor that rattles in its play: in single precision, motions from the same start soon differ.
+pub fn loose() -> (&'static str, ExportModel) {
+    let system = system("pendulum", LOOSE);
+    (
+        "pendulum_loose",
+        physics(&system, Integrator::fine(4.try_into().unwrap()), 0.01),
+    )
 }
 
 /// A built-in system with effects appended to its file.

@@ -9,8 +9,8 @@ use super::verify::{Predictions, ReferenceModel, Samples, draw};
 use residyn_core::data::{Joint, Quantity};
 use residyn_core::expr::{Op, Program};
 use residyn_core::model::{
-    CommandFilter, Dynamics, MlpWeights, Model, ModelError, ModelWeights, NetworkError, Parameter,
-    nothing_but,
+    CommandFilter, Dynamics, InternalState, MlpWeights, Model, ModelError, ModelWeights,
+    NetworkError, Parameter, nothing_but,
 };
 use residyn_core::sim::Integrator;
 
@@ -66,6 +66,19 @@ pub struct ExportedEffect {
     pub joint: Joint,
     pub expression: String,
     pub parameters: Vec<String>,
+    /// Its states, in the order in which they stand among those of the model.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub states: Vec<ExportedState>,
+}
+
+/// A state of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ExportedState {
+    pub name: String,
+    pub unit: String,
+    pub about: String,
+    /// Its value before anything has moved.
+    pub start: f64,
 }
 
 impl ExportModel {
@@ -106,7 +119,7 @@ impl ExportModel {
     /// # Errors
     /// The first column that it reads.
     pub fn check_measured(&self) -> Result<(), ModelError> {
-        self.system.stands_alone("an exported file")
+        self.system.runs_without_logs("an exported file")
     }
 
     /// The same model with a task.
@@ -176,6 +189,37 @@ impl ExportModel {
     /// Number of joints n.
     pub fn joints(&self) -> usize {
         self.equations.joints
+    }
+
+    /// Number of states: positions, velocities, then the states of effects.
+    pub fn states(&self) -> usize {
+        self.equations.states()
+    }
+
+    /// The states of effects, each with its effect, in their order among the states.
+    pub(super) fn internal(&self) -> impl Iterator<Item = (&ExportedEffect, &ExportedState)> {
+        let each = |effect| ExportedEffect::states_with(effect);
+        self.effects.iter().flat_map(each)
+    }
+
+    /// The state at rest, before anything has moved.
+    pub(super) fn rest(&self) -> Vec<f64> {
+        let internal = self.internal().map(|(_, state)| state.start);
+        vec![0.0; 2 * self.joints()]
+            .into_iter()
+            .chain(internal)
+            .collect()
+    }
+
+    /// Where states come to a stop at the ends of a range: an importer's own solver is not told when.
+    pub(super) fn stops(&self) -> bool {
+        let mut states = self
+            .system
+            .effects
+            .iter()
+            .flat_map(|own| &own.effect.states);
+        let stops = |state: &InternalState| state.rate.is_some() && state.within.is_some();
+        !self.effects.is_empty() && states.any(stops)
     }
 
     /// The networks by name, in order of evaluation. Each has n or `2n` outputs, added to the last of the rates.
@@ -360,6 +404,9 @@ fn exported_effects(system: &Model, equations: &Dynamics) -> Vec<ExportedEffect>
     if equations.parameters.len() < first {
         return Vec::new();
     }
+    let names = equations.internal.iter().flat_map(|own| own.names.clone());
+    let starts = equations.internal_starts(&equations.values());
+    let mut named = names.zip(starts);
     let effects = system.effects.iter().map(|effect| {
         let own = &equations.parameters[first..first + effect.values.len()];
         first += own.len();
@@ -369,7 +416,21 @@ fn exported_effects(system: &Model, equations: &Dynamics) -> Vec<ExportedEffect>
             joint: effect.joint,
             expression: effect.expression(&names, system.driven_by()),
             parameters: names,
+            states: (effect.effect.states.iter().zip(named.by_ref()))
+                .map(|(state, (name, start))| ExportedState {
+                    name,
+                    unit: state.unit.clone(),
+                    about: state.about.clone(),
+                    start,
+                })
+                .collect(),
         }
     });
     effects.collect()
+}
+
+impl ExportedEffect {
+    fn states_with(&self) -> impl Iterator<Item = (&Self, &ExportedState)> {
+        self.states.iter().map(move |state| (self, state))
+    }
 }

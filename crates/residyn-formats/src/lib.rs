@@ -21,7 +21,7 @@ mod urdf;
 mod verify;
 mod xml;
 
-pub use export_model::{ExportModel, ExportedEffect, ExportedTask};
+pub use export_model::{ExportModel, ExportedEffect, ExportedState, ExportedTask};
 pub use format::{ExportError, File, Format, RobotReader, model_of, robot_reader};
 pub use json::{Description, ImportError, Imported};
 pub use robot::write_back::{WrittenBack, write_back};

@@ -43,19 +43,18 @@ impl ExportModel {
 
 /// The fastest decay rate of velocities \[1/s\] at rest in a position, without torque.
 fn rate(model: &Dynamics, position: &[f64]) -> f64 {
-    let n = model.joints;
-    let rates = |joint: usize, velocity: f64| {
-        let still = vec![0.0; 2 * n + 1];
-        let mut inputs = [position, &still, &model.values()].concat();
-        inputs[n + joint] = velocity;
-        model.program.eval(&inputs)
+    let (n, values) = (model.joints, model.values());
+    let still = vec![0.0; n];
+    let internal = model.internal_starts(&values);
+    let accelerations = |joint: usize, velocity: f64| {
+        let mut state = [position, &still, &internal].concat();
+        state[n + joint] = velocity;
+        model.rates(&state, &still, &values)[n..2 * n].to_vec()
     };
     let mut slopes = DMatrix::zeros(n, n);
     for joint in 0..n {
-        let [faster, slower] = [AROUND_REST, -AROUND_REST].map(|velocity| rates(joint, velocity));
-        // The last rates are those of the velocities.
-        let pairs = faster.iter().zip(&slower).rev().zip((0..n).rev());
-        for ((faster, slower), i) in pairs {
+        let [faster, slower] = [AROUND_REST, -AROUND_REST].map(|v| accelerations(joint, v));
+        for (i, (faster, slower)) in faster.iter().zip(slower).enumerate() {
             slopes[(i, joint)] = (faster - slower) / (2.0 * AROUND_REST);
         }
     }

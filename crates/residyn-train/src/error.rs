@@ -54,6 +54,16 @@ pub enum TrainError {
         found: usize,
     },
     #[error(
+        "{role} segments have {found} internal states, but the model of `{system}` has {expected}; cut them with \
+         the states along each trajectory"
+    )]
+    InternalStates {
+        role: &'static str,
+        system: String,
+        expected: usize,
+        found: usize,
+    },
+    #[error(
         "`error_scale` needs {states} finite numbers above zero, one for each state (positions, then \
          velocities); it is {scale:?}"
     )]

@@ -112,11 +112,12 @@ fn fit_settings(settings: &LearnSettings) -> FitSettings {
 /// Segments to train on, and to choose the epoch by.
 fn segments(task: &ResidualTask) -> [Segments; 2] {
     let (joints, steps) = (task.equations.joints, task.settings.steps);
+    let internal = task.equations.layout().internal().len();
     let sets = [&task.training, &task.validation];
     let rows: usize = sets.iter().copied().flatten().map(|s| s.time.len()).sum();
     let stride = (rows / task.settings.segments).max(1);
     sets.map(|blocks: &Vec<Trajectory>| {
-        let mut set = Segments::new(joints, steps);
+        let mut set = Segments::new(joints, steps).with_internal(internal);
         for block in blocks {
             // A block that is too short holds no segment, which is not an error here.
             let _ = set.push_trajectory(&block.time, &block.states, &block.inputs, stride);

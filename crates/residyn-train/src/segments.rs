@@ -11,8 +11,10 @@ use residyn_io::files::content_id;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segments {
     joints: usize,
+    /// Number of states: positions, velocities, then internal states.
+    width: usize,
     steps: usize,
-    /// `[segment][k + 1][2n]`: positions, then velocities.
+    /// `[segment][k + 1][state]`
     states: Vec<f32>,
     /// `[segment][k][n]`, each held over its step.
     inputs: Vec<f32>,
@@ -46,6 +48,7 @@ impl Segments {
         assert!(joints > 0 && steps > 0, "segments have joints and steps");
         Self {
             joints,
+            width: 2 * joints,
             steps,
             states: Vec::new(),
             inputs: Vec::new(),
@@ -54,10 +57,19 @@ impl Segments {
         }
     }
 
+    /// The same for models with this many internal states, whose values at each row are data as well.
+    #[must_use]
+    pub fn with_internal(self, internal: usize) -> Self {
+        Self {
+            width: 2 * self.joints + internal,
+            ..self
+        }
+    }
+
     /// Cuts a trajectory into segments; a new one begins every `stride` rows.
     ///
-    /// `time` has one number per row (s), `states` `2n` (positions, velocities), `inputs` `n` (held until the next row;
-    /// the last row's is not used).
+    /// `time` has one number per row (s), `states` `2n` (positions, velocities) and the internal ones, `inputs` `n` (held
+    /// until the next row; the last row's is not used).
     ///
     /// # Errors
     /// Lengths that disagree, numbers that are not finite, time that does not increase, too few rows. The segments then
@@ -72,7 +84,7 @@ impl Segments {
         inputs: &[f64],
         stride: usize,
     ) -> Result<(), SegmentsError> {
-        let (rows, n) = (time.len(), self.joints);
+        let (rows, n, width) = (time.len(), self.joints, self.width);
         self.check(time, states, inputs)?;
         if rows <= self.steps {
             return Err(SegmentsError::TooShort {
@@ -82,7 +94,7 @@ impl Segments {
         }
         for first in (0..rows - self.steps).step_by(stride) {
             let last = first + self.steps;
-            push(&mut self.states, &states[2 * n * first..2 * n * (last + 1)]);
+            push(&mut self.states, &states[width * first..width * (last + 1)]);
             push(&mut self.inputs, &inputs[n * first..n * last]);
             let steps = time[first..=last].windows(2).map(|pair| pair[1] - pair[0]);
             push(&mut self.dt, &steps.collect::<Vec<_>>());
@@ -95,7 +107,7 @@ impl Segments {
         let (rows, n) = (time.len(), self.joints);
         let parts = [
             ("time", time, 1),
-            ("states", states, 2 * n),
+            ("states", states, self.width),
             ("inputs", inputs, n),
         ];
         for (what, numbers, width) in parts {
@@ -155,6 +167,14 @@ impl Segments {
                 found: self.joints,
             });
         }
+        if self.width != structure.states() {
+            return Err(TrainError::InternalStates {
+                role,
+                system: structure.system.clone(),
+                expected: structure.states() - 2 * structure.joints,
+                found: self.width - 2 * self.joints,
+            });
+        }
         Ok(())
     }
 
@@ -164,7 +184,10 @@ impl Segments {
         let numbers = numbers.into_iter().flatten().map(|x| x.to_bits());
         #[allow(clippy::cast_possible_truncation)] // few joints and steps
         let shape = [self.joints as u32, self.steps as u32];
-        let bytes = shape.into_iter().chain(numbers).flat_map(u32::to_le_bytes);
+        #[allow(clippy::cast_possible_truncation)] // few states
+        let internal = (self.width > 2 * self.joints).then_some(self.width as u32);
+        let shape = shape.into_iter().chain(internal);
+        let bytes = shape.chain(numbers).flat_map(u32::to_le_bytes);
         content_id(&bytes.collect::<Vec<u8>>())
     }
 
@@ -173,7 +196,7 @@ impl Segments {
         let n = self.joints;
         (0..self.len() * self.steps).map(move |k| {
             let (segment, step) = (k / self.steps, k % self.steps);
-            let state = 2 * n * (segment * (self.steps + 1) + step);
+            let state = self.width * (segment * (self.steps + 1) + step);
             let wide = |numbers: &[f32]| numbers.iter().copied().map(f64::from).collect();
             [
                 wide(&self.states[state..state + n]),
@@ -202,21 +225,21 @@ impl Segments {
 
     /// The chosen segments for the fused loss.
     pub(super) fn blocks(&self, chosen: &[usize]) -> Blocks {
-        let (n, k) = (self.joints, self.steps);
-        Blocks::new(n, k, chosen.len(), |row| {
+        let (n, width, k) = (self.joints, self.width, self.steps);
+        Blocks::new([n, width], k, chosen.len(), |row| {
             let segment = chosen[row];
-            let states = &self.states[2 * n * segment * (k + 1)..][..2 * n * (k + 1)];
+            let states = &self.states[width * segment * (k + 1)..][..width * (k + 1)];
             let inputs = &self.inputs[n * k * segment..][..n * k];
             let mut time = self.start[segment];
             let mut values = Vec::new();
             for step in 0..k {
                 let dt = self.dt[segment * k + step];
-                values.extend_from_slice(&states[2 * n * step..][..2 * n]);
+                values.extend_from_slice(&states[width * step..][..width]);
                 values.extend_from_slice(&inputs[n * step..][..n]);
                 values.extend([dt, time]);
                 time += dt;
             }
-            values.extend_from_slice(&states[2 * n * k..]);
+            values.extend_from_slice(&states[width * k..]);
             values
         })
     }
@@ -240,7 +263,7 @@ impl Segments {
         }
         Columns {
             inputs: group(&self.inputs, k, n),
-            states: group(&self.states, k + 1, 2 * n),
+            states: group(&self.states, k + 1, self.width),
             dt,
             time,
             size: chosen.len(),

@@ -5,6 +5,7 @@ use thiserror::Error;
 
 use super::Task;
 use crate::plan::{Planner, Start};
+use residyn_core::sim::Environment;
 use residyn_core::sim::batch::{Block, Rollouts};
 
 /// Decides the torque of each step.
@@ -29,6 +30,8 @@ pub struct LostPlan {
 pub struct Controller<'p, 'r> {
     planner: &'p Planner<Block<'r>>,
     rollouts: &'r Rollouts,
+    /// Follows the states of the model's effects.
+    observer: Option<Environment<'r>>,
     replan: usize,
     plan: VecDeque<Vec<f64>>,
     /// The last torques, as many as the model's delays need.
@@ -39,12 +42,19 @@ pub struct Controller<'p, 'r> {
 }
 
 impl<'p, 'r> Controller<'p, 'r> {
-    /// Executes `replan` steps of each plan; the planner's blocks are of these rollouts.
-    pub fn new(planner: &'p Planner<Block<'r>>, rollouts: &'r Rollouts, replan: usize) -> Self {
+    /// Executes `replan` steps of each plan; the planner's blocks are of these rollouts, whose model `observer` follows if it
+    /// has internal states.
+    pub fn new(
+        planner: &'p Planner<Block<'r>>,
+        rollouts: &'r Rollouts,
+        observer: Option<Environment<'r>>,
+        replan: usize,
+    ) -> Self {
         planner.forget();
         Self {
             planner,
             rollouts,
+            observer,
             replan,
             plan: VecDeque::new(),
             past: VecDeque::new(),
@@ -84,7 +94,9 @@ impl<'p, 'r> Controller<'p, 'r> {
         }
         let past = self.past.make_contiguous();
         let carried = self.rollouts.carried(past, self.planner.horizon());
-        let plan = self.planner.plan(Start::after(measured, time_s, carried));
+        let internal = self.observer.as_ref().map(Environment::internal);
+        let state = [measured, &internal.unwrap_or_default()].concat();
+        let plan = self.planner.plan(Start::after(&state, time_s, carried));
         self.plan = plan.inputs.into_iter().take(self.replan).collect();
         self.decisions += 1;
         self.diverged += plan.diverged;
@@ -100,6 +112,9 @@ impl Policy for Controller<'_, '_> {
             self.decide(measured, time_s);
         }
         let torque = self.plan.pop_front().expect("a plan has steps");
+        if let Some(observer) = &mut self.observer {
+            observer.step(&mut measured.to_vec(), &torque, time_s);
+        }
         self.past.push_back(torque.clone());
         if self.past.len() > self.rollouts.memory() {
             self.past.pop_front();

@@ -1,7 +1,7 @@
 use crate::plan::Objective;
 use residyn_core::model::{Dynamics, MlpWeights};
-use residyn_core::sim::Integrator;
 use residyn_core::sim::batch::Rollouts;
+use residyn_core::sim::{Environment, Integrator};
 
 /// A model as the planner uses it: equations with their values, networks whose outputs are added to their derivative,
 /// and the integrator.
@@ -36,6 +36,13 @@ impl Predictor {
     /// Number of joints.
     pub fn joints(&self) -> usize {
         self.equations.joints
+    }
+
+    /// The states of the model's effects along what is measured and commanded, if its effects have any: no sensor shows them.
+    /// Networks, which do not act on them, are left out.
+    pub fn observer(&self, step_s: f64) -> Option<Environment<'_>> {
+        self.equations.internal.as_ref()?;
+        Some(Environment::new(&self.equations, self.integrator, step_s))
     }
 
     /// Rollouts of the model under this objective, in steps of `step_s` seconds.

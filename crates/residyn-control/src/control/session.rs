@@ -17,5 +17,6 @@ pub fn with_controller<R>(
 ) -> R {
     let rollouts = predictor.rollouts(&task.objective(), task.step_s);
     let planner = Planner::new(&task.planner, &task.torque, || rollouts.block(), rng);
-    planner.with_workers(|| lead(&mut Controller::new(&planner, &rollouts, replan)))
+    let observer = predictor.observer(task.step_s);
+    planner.with_workers(|| lead(&mut Controller::new(&planner, &rollouts, observer, replan)))
 }

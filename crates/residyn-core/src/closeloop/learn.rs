@@ -16,10 +16,10 @@ use super::refine::Refined;
 use super::settings::LearnSettings;
 use super::split::between;
 use super::stage::{Progress, Stage, Watch};
-use crate::data::{Log, Thinning, Trajectory, trajectories};
+use crate::data::{Log, Thinning, Trajectory};
 use crate::model::{Dynamics, Origin};
-use crate::sim::as_modelled;
 use crate::sim::metric::assess;
+use crate::sim::motions;
 
 /// What a residual network is trained on.
 #[derive(Debug)]
@@ -134,13 +134,13 @@ pub fn learn(
     rng: &mut impl Rng,
     watch: &dyn Watch,
 ) -> Option<Learned> {
-    // A network is trained on motion, and knows no internal states.
-    let learner = learner.filter(|_| {
-        let problem = &refined.problem;
-        let has_states = !refined.after.model.layout().internal().is_empty();
-        problem.error_model == ErrorModel::OutputError && !has_states
-    })?;
     let (problem, fitted) = (&refined.problem, &refined.after);
+    // A network is trained on motion, and adds an acceleration to what the sensors show, of which the other side of a
+    // transmission would know nothing.
+    let learner = learner.filter(|_| {
+        let has_transmission = fitted.model.dynamics().has_transmission();
+        problem.error_model == ErrorModel::OutputError && !has_transmission
+    })?;
     let mut tell = |text: &str| {
         let text = format!("{}, {text}", Stage::Learn.text());
         watch.see(Progress::within(Stage::Learn, &text));
@@ -224,7 +224,7 @@ fn task(
         length_s: settings.block_s,
     };
     let dynamics = fitted.model.dynamics();
-    let of_log = |log: &Log| trajectories(&as_modelled(&*dynamics.in_log(log), log), thinning);
+    let of_log = |log: &Log| motions(&*dynamics.in_log(log), log, thinning);
     let blocks = logs.iter().flat_map(of_log);
     let (mut training, mut validation) = (Vec::new(), Vec::new());
     for (k, block) in blocks.enumerate() {

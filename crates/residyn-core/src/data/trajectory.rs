@@ -7,7 +7,7 @@ use super::{Log, SAME_S, half_width_s, local_cubic};
 pub struct Trajectory {
     /// Time of each row \[s\].
     pub time: Vec<f64>,
-    /// `[row][2n]`: positions, then velocities.
+    /// `[row][state]`: positions, velocities, then the internal states of a model.
     pub states: Vec<f64>,
     /// `[row][n]`: the torque until the next row.
     pub inputs: Vec<f64>,
@@ -24,9 +24,9 @@ pub struct Thinning {
     pub length_s: f64,
 }
 
-/// The log's motions with smoothed states, cut at gaps and at intervals that are left out. Some may be empty or have a
-/// single row.
-pub fn trajectories(log: &Log, thinning: Thinning) -> Vec<Trajectory> {
+/// The log's motions with smoothed states, cut at gaps and at intervals that are left out, and with a model's `internal`
+/// states along it, `[state][row]`. Some may be empty or have a single row.
+pub fn trajectories(log: &Log, internal: &[Vec<f64>], thinning: Thinning) -> Vec<Trajectory> {
     let step = log.median_step();
     let half_width = half_width_s(step);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small positive number
@@ -51,6 +51,7 @@ pub fn trajectories(log: &Log, thinning: Thinning) -> Vec<Trajectory> {
                 current.time.push(from);
                 current.states.extend(states.iter().map(|s| s.value));
                 current.states.extend(states.iter().map(|s| s.slope));
+                current.states.extend(internal.iter().map(|z| z[first]));
                 #[allow(clippy::cast_precision_loss)] // few rows
                 let mean =
                     |tau: &Vec<f64>| tau[first..first + merged].iter().sum::<f64>() / merged as f64;

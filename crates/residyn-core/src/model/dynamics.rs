@@ -174,6 +174,26 @@ impl Dynamics {
         self.layout().states().len()
     }
 
+    /// The rates of all states at a moment, at time 0: of positions, velocities and internal states, while `driving` acts.
+    pub fn rates(&self, state: &[f64], driving: &[f64], values: &[f64]) -> Vec<f64> {
+        let layout = self.layout();
+        let mut inputs = vec![0.0; layout.parameters()];
+        inputs[layout.states()].copy_from_slice(state);
+        inputs[layout.driving()].copy_from_slice(driving);
+        if !layout.internal().is_empty() {
+            inputs[layout.starts()].copy_from_slice(&state[layout.internal()]);
+        }
+        inputs.extend_from_slice(values);
+        self.program.eval(&inputs)
+    }
+
+    /// Whether some internal states are those of a motor behind a transmission: they alone come to rest under what acts at a
+    /// log's first row.
+    pub fn has_transmission(&self) -> bool {
+        let mut internal = self.internal.iter();
+        internal.any(|own| own.settled.contains(&true))
+    }
+
     /// The internal states before a log begins, at these values of the parameters.
     pub fn internal_starts(&self, values: &[f64]) -> Vec<f64> {
         let starts = self.internal.as_ref().map(|own| own.starts.eval(values));

@@ -47,6 +47,26 @@ pub struct Dependence {
 }
 
 impl InternalStates {
+    /// States of these names and values at rest, of a model with these parameters whose rates are known only all together.
+    pub fn at_rest<'p>(
+        names: Vec<String>,
+        starts: &[f64],
+        parameters: impl Iterator<Item = &'p str>,
+    ) -> Self {
+        let mut graph = Graph::new();
+        for name in parameters {
+            graph.input(name);
+        }
+        let starts: Vec<Node> = starts.iter().map(|start| graph.constant(*start)).collect();
+        Self {
+            settled: vec![false; names.len()],
+            names,
+            rates: Graph::new().finish(&[]),
+            starts: graph.finish(&starts),
+            pairs: Vec::new(),
+        }
+    }
+
     pub(super) fn new(
         (names, settled): (Vec<String>, Vec<bool>),
         [rates, starts]: [Program; 2],
@@ -94,11 +114,11 @@ impl InternalStates {
 }
 
 /// Shorter steps count as this long where a range limits a rate, s: zero steps have rates as well.
-const SHORTEST_S: f64 = 1e-9;
+pub(super) const SHORTEST_S: f64 = 1e-9;
 
 impl InternalState {
     /// By what a motor leads its link, which may have ends, and how fast that grows.
-    pub(super) fn of_transmission(twist_within: Option<[Formula; 2]>) -> [Self; 2] {
+    pub(super) fn of_transmission(free_within: Option<[Formula; 2]>) -> [Self; 2] {
         let [twist, twist_rate, _] = TRANSMISSION_NAMES;
         let states = [
             (twist, "rad", "angle by which the motor leads the link"),
@@ -112,7 +132,7 @@ impl InternalState {
             start: None,
             within: None,
         });
-        twist.within = twist_within;
+        twist.within = free_within;
         [twist, rate]
     }
 

@@ -34,7 +34,8 @@ impl<'d> Environment<'d> {
         }
     }
 
-    /// Advance `state` (positions, then velocities) by one step from `time_s` under the torque `tau`.
+    /// Advance `state` by one step from `time_s` under the torque `tau`: positions and velocities, and the internal states
+    /// if they are given, else as the last step left them.
     ///
     /// # Panics
     /// When `state` or `tau` does not have the model's size.
@@ -55,6 +56,12 @@ impl<'d> Environment<'d> {
         for (value, Row([moved])) in state.iter_mut().zip(&self.simulator.state) {
             *value = *moved;
         }
+    }
+
+    /// The internal states as the last step left them; before the first as before a log.
+    pub fn internal(&self) -> Vec<f64> {
+        let internal = &self.simulator.state[self.model.dynamics.layout().internal()];
+        internal.iter().map(|Row([value])| *value).collect()
     }
 
     /// The angles that sensors show of `state` at the end of the last step, or before the first, at `time_s`.

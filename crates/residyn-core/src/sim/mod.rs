@@ -24,7 +24,7 @@ pub use internal::{Case, Course, InternalRates, InternalStart, LoggedMotion, int
 pub use objective::Objective;
 pub use point::Point;
 pub use scheme::{RK4, SCHEMES, SEMI_IMPLICIT_EULER, Scheme, Stage};
-pub use sensors::{Sensors, as_modelled, with_own_angles};
+pub use sensors::{Sensors, motions, with_own_angles};
 pub use simulator::{Hold, Simulator};
 pub use stepper::Stepper;
 pub use substeps::{FINE_FIT_S, FIT_S, PREDICTION_S, RIG_S, substeps};

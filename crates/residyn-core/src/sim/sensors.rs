@@ -1,7 +1,7 @@
 use std::borrow::Cow;
 
 use super::{Commands, Point, internal_along};
-use crate::data::{Log, half_width_s, local_cubic};
+use crate::data::{Log, Thinning, Trajectory, half_width_s, local_cubic, trajectories};
 use crate::expr::Tape;
 use crate::lanes::Row;
 use crate::model::InputLayout;
@@ -119,10 +119,11 @@ fn speeds(log: &Log) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// A log in the quantities of the equations of motion: the angles of the rig, and the torques that act.
-#[must_use]
-pub fn as_modelled<'d>(model: impl Into<Point<'d>>, log: &Log) -> Log {
+/// The motions of a log as a model sees them, with its internal states along them: what it can be trained on.
+pub fn motions<'d>(model: impl Into<Point<'d>>, log: &Log, thinning: Thinning) -> Vec<Trajectory> {
     let model = model.into();
     let own = with_own_angles(&model, log);
-    Commands::of_log(model, log).acting_on(&own)
+    let commands = Commands::of_log(&model, log);
+    let internal = internal_along(&model, &own, &commands);
+    trajectories(&commands.acting_on(&own), &internal, thinning)
 }

@@ -141,14 +141,14 @@ impl Simulator<1> {
         self.write(state);
     }
 
-    /// Put the joints at these positions, then velocities; internal states stay as they are.
+    /// Put the joints at these positions, then velocities; internal states stay as they are unless they are given as well.
     ///
     /// # Panics
-    /// When `motion` does not have two values for each joint.
-    pub fn place(&mut self, motion: &[f64]) {
-        let expected = self.layout.internal().start;
-        assert_eq!(motion.len(), expected, "two values for each joint");
-        self.write(motion);
+    /// When there are neither two values for each joint nor one for each state.
+    pub fn place(&mut self, state: &[f64]) {
+        let expected = [self.layout.internal().start, self.layout.states().end];
+        assert!(expected.contains(&state.len()), "two values for each joint");
+        self.write(state);
     }
 
     fn write(&mut self, values: &[f64]) {

@@ -122,7 +122,12 @@ impl Block {
 
 /// What of a powertrain no block holds.
 fn beyond_a_block(powertrain: &Powertrain) -> Vec<String> {
-    let Powertrain { joint, zero, drive } = powertrain;
+    let Powertrain {
+        joint,
+        zero,
+        drive,
+        motor,
+    } = powertrain;
     let constant = drive.bias[0];
     let parts = [
         (constant != 0.0).then(|| format!("a constant torque of {}", number(constant))),
@@ -132,6 +137,7 @@ fn beyond_a_block(powertrain: &Powertrain) -> Vec<String> {
             format!("a spring of {stiffness} with rest at {rest}")
         }),
         (*zero != 0.0).then(|| format!("a zero that is off by {}", number(*zero))),
+        motor.as_ref().map(|motor| motor.said.clone()),
     ];
     parts.into_iter().flatten().collect()
 }

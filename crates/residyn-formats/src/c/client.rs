@@ -23,6 +23,7 @@ pub(super) fn predict(path: &Path, samples: &Samples) -> Result<Predictions, Cli
         .arg(std::path::absolute(path).map_err(io)?)
         .arg(format!("-DMODEL(name)={}_##name", upper.to_lowercase()))
         .arg(format!("-DJOINTS={upper}_JOINTS"))
+        .arg(format!("-DSTATES={upper}_STATES"))
         .args([&source, Path::new("-o"), &program, Path::new("-lm")]);
     compile(command)?;
     let printed = run(Command::new(&program), &input(samples)).map_err(io)?;
@@ -95,7 +96,7 @@ fn parsed(printed: &str, samples: &Samples) -> Option<Predictions> {
     };
     let rows: Vec<Vec<f64>> = printed.lines().map(row).collect::<Option<_>>()?;
     let (points, rollout) = rows.split_at_checked(samples.states.len())?;
-    let states = 2 * samples.joints;
+    let states = samples.start.len();
     let (next, derivative) = points
         .iter()
         .map(|row| row.split_at_checked(states))

@@ -7,10 +7,19 @@ use residyn_core::expr::{Graph, Node, Program};
 /// The functions of the derivative and its Jacobian.
 pub(super) fn derivative(model: &ExportModel, names: &Names) -> String {
     let program = &model.equations.program;
-    let rates: Vec<String> = (0..2 * model.joints())
-        .map(|k| format!("rates[{k}]"))
-        .collect();
-    include_str!("derivative.h")
+    let rates: Vec<String> = (0..model.states()).map(|k| format!("rates[{k}]")).collect();
+    let (template, starts) = match &model.equations.internal {
+        None => (include_str!("derivative.h"), String::new()),
+        Some(internal) => {
+            let first = model.equations.layout().internal().start;
+            let places = (0..internal.names.len()).map(|k| format!("state[{}]", first + k));
+            let places: Vec<String> = places.collect();
+            let starts = assignments(&internal.starts, &places, names);
+            (include_str!("mean_rates.h"), starts)
+        }
+    };
+    template
+        .replace("STARTS\n", &starts)
         .replace(
             "RATES\n",
             &(assignments(program, &rates, names) + &networks::added(model)),
@@ -37,8 +46,7 @@ pub(super) fn inverse(model: &ExportModel, names: &Names) -> String {
 }
 
 fn jacobian(model: &ExportModel, names: &Names) -> String {
-    let n = model.joints();
-    let program = &model.equations.program;
+    let (program, layout) = (&model.equations.program, model.equations.layout());
     let mut graph = Graph::new();
     let inputs: Vec<Node> = program
         .inputs()
@@ -46,14 +54,22 @@ fn jacobian(model: &ExportModel, names: &Names) -> String {
         .map(|name| graph.input(name))
         .collect();
     let rates = graph.append(program, &inputs);
-    let rows = graph.jacobian(&rates, &inputs[..3 * n]);
-    let place = |row: usize, column: usize| match column.checked_sub(2 * n) {
-        None => format!("by_state[{row}][{column}]"),
-        Some(joint) => format!("by_torque[{row}][{joint}]"),
-    };
-    let places: Vec<String> = (0..2 * n)
-        .flat_map(|row| (0..3 * n).map(move |column| place(row, column)))
-        .collect();
+    let parts = [
+        ("by_state", layout.states()),
+        ("by_torque", layout.driving()),
+        ("by_begun", layout.starts()),
+    ];
+    let columns = parts.clone().map(|(_, places)| inputs[places].to_vec());
+    let rows = graph.jacobian(&rates, &columns.concat());
+    let columns = parts
+        .iter()
+        .flat_map(|(part, places)| (0..places.len()).map(move |column| (*part, column)));
+    let columns: Vec<(&str, usize)> = columns.collect();
+    let places = (0..rates.len()).flat_map(|row| {
+        let place = move |(part, column): &(&str, usize)| format!("{part}[{row}][{column}]");
+        columns.iter().map(place)
+    });
+    let places: Vec<String> = places.collect();
     assignments(&graph.finish(&rows.concat()), &places, names)
 }
 

@@ -45,8 +45,8 @@ pub(super) fn header(model: &ExportModel) -> Result<String, ExportError> {
         networks::tables(model, &names),
         equations::derivative(model, &names),
         equations::inverse(model, &names),
-        include_str!("flow.h").to_owned(),
-        advance(model.integrator.scheme(), &names),
+        stepped(include_str!("flow.h"), model),
+        stepped(&advance(model.integrator.scheme(), &names), model),
         include_str!("step.h").to_owned(),
     ];
     let (head, upper) = (head(model, &names), &names.upper);
@@ -54,6 +54,38 @@ pub(super) fn header(model: &ExportModel) -> Result<String, ExportError> {
     Ok(format!(
         "{head}#ifndef {upper}_H\n#define {upper}_H\n\n{code}\n#undef {upper}_\n#endif\n"
     ))
+}
+
+/// A template in which the rates are those at a moment or, if effects have states, the means over a step.
+fn stepped(template: &str, model: &ExportModel) -> String {
+    let places = [
+        ("RATES", "derivative", "mean_rates"),
+        ("STATE_AND_STEP", "", "state, h, "),
+        ("STATE_OF_STATE_AND_STEP", "", "state, of_state, h, "),
+        ("STEP", "", "begun, length, "),
+        (
+            "STEP_TAKEN",
+            "",
+            "\n        const model_real begun[MODEL_STATES],\n        \
+             model_real of_begun[MODEL_STATES][MODEL_COLUMNS], model_real length,",
+        ),
+        ("BY_BEGUN", "", "by_begun, "),
+        (
+            "BY_BEGUN_TAKEN",
+            "",
+            "\n    model_real by_begun[MODEL_STATES][MODEL_INTERNAL];",
+        ),
+        ("OF_BEGUN", "", include_str!("of_begun.h")),
+        ("OTHERS", "", include_str!("others.h")),
+        ("OF_OTHERS", "", include_str!("of_others.h")),
+    ];
+    let has_states = model.internal().next().is_some();
+    let chosen =
+        places.map(|(name, without, with)| (name, if has_states { with } else { without }));
+    let values: Vec<(&str, &dyn std::fmt::Display)> = (chosen.iter())
+        .map(|(name, text)| (*name, text as &dyn std::fmt::Display))
+        .collect();
+    filled(template, &values)
 }
 
 /// The step of a scheme, and its derivatives.
@@ -96,9 +128,17 @@ fn head(model: &ExportModel, names: &Names) -> String {
         Quantity::Command => "the commands of the drives",
         _ => "in N m (N)",
     };
+    let rest = match model.internal().next() {
+        Some(_) => "\n    model_rest(&parameters, state);",
+        None => "",
+    };
     let usage = filled(
         include_str!("usage.txt"),
-        &[("STEP", &model.step_s), ("DRIVING", &driving)],
+        &[
+            ("STEP", &model.step_s),
+            ("DRIVING", &driving),
+            ("REST", &rest),
+        ],
     );
     let usage = names.fill(&usage);
     lines.extend(["".to_owned(), usage.trim_end().to_owned(), "".to_owned()]);
@@ -128,14 +168,24 @@ fn comment(text: &str) -> String {
 }
 
 fn sizes(model: &ExportModel) -> String {
-    let n = model.joints();
+    let (n, states) = (model.joints(), model.states());
     let parts = model.integrator.substeps();
+    let internal: Vec<String> = (model.internal())
+        .map(|(effect, state)| format!("{} of {}", state.name, effect.name))
+        .collect();
+    let (of_effects, defined) = match internal.len() {
+        0 => (String::new(), String::new()),
+        count => (
+            format!(", then {}", comment(&internal.join(", "))),
+            format!("#define MODEL_INTERNAL {count} /* states of effects */\n"),
+        ),
+    };
     format!(
-        "#define MODEL_JOINTS {n}\n#define MODEL_STATES {} /* positions, then velocities */\n\
+        "#define MODEL_JOINTS {n}\n\
+         #define MODEL_STATES {states} /* positions, then velocities{of_effects} */\n{defined}\
          #define MODEL_COLUMNS {} /* states and torques, which derivatives are by */\n\
          #define MODEL_PARTS {parts} /* of a step */\n",
-        2 * n,
-        3 * n
+        states + n
     )
 }
 

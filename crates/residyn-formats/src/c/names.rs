@@ -18,9 +18,9 @@ pub(crate) struct Names {
 /// Reserved names: keywords of C and C++, names that the functions use, and macros.
 const TAKEN: &str = "\
     HUGE_VAL INFINITY M_E M_PI NAN NULL acceleration alignas alignof and and_eq asm auto bitand bitor bool break \
-    by_state by_torque case catch char class compl concept const const_cast consteval constexpr \
+    begun by_begun by_state by_torque case catch char class compl concept const const_cast consteval constexpr \
     constinit continue cos decltype default delete do double dynamic_cast else enum exp explicit \
-    export extern fabs false float for friend goto if inline int linux log long mutable namespace \
+    export extern fabs false float for friend goto if inline int length linux log long mutable namespace \
     needed new noexcept not not_eq nullptr operator or or_eq parameters pow private protected public rates \
     register reinterpret_cast requires restrict return short signed sin sizeof sqrt state static \
     static_assert static_cast struct switch tan tanh template this thread_local throw time torque \
@@ -42,6 +42,18 @@ impl Names {
             .chain(of_joints("qdd", "acceleration", 0))
             .chain(of_joints(model.equations.driven_by().key(), "torque", 0))
             .chain([("t".to_owned(), "time".to_owned())]);
+        let internal = model.internal().enumerate().flat_map(|(k, (_, state))| {
+            let before = (
+                format!("{}_before", state.name),
+                format!("begun[{}]", 2 * n + k),
+            );
+            [
+                (state.name.clone(), format!("state[{}]", 2 * n + k)),
+                before,
+            ]
+        });
+        let length = ("step_s".to_owned(), "length".to_owned());
+        let moving = moving.chain(internal).chain([length]);
         let held = model.equations.parameters.iter().map(|parameter| {
             let field = variable(&parameter.name);
             (parameter.name.clone(), format!("parameters->{field}"))

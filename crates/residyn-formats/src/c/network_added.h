@@ -3,5 +3,5 @@
         int i;
         model_NETWORK(state, torque, y);
         for (i = 0; i < OUTPUTS; i++)
-            rates[MODEL_STATES - OUTPUTS + i] += y[i];
+            rates[2 * MODEL_JOINTS - OUTPUTS + i] += y[i];
     }

@@ -14,7 +14,7 @@ static inline void model_advance(const model_parameters *parameters, model_real 
         inner[i] = sum[i] = state[i];
     for (stage = 0; stage < MODEL_STAGES; stage++) {
         const model_real weight = model_weight[stage] * h, reach = model_reach[stage] * h;
-        model_derivative(parameters, inner, torque, now, rates);
+        model_@RATES@(parameters, @STATE_AND_STEP@inner, torque, now, rates);
         for (i = 0; i < MODEL_STATES; i++) {
             sum[i] += weight * rates[i];
             inner[i] = state[i] + reach * rates[i];
@@ -43,7 +43,7 @@ static inline void model_advance_jacobian(const model_parameters *parameters,
     }
     for (stage = 0; stage < MODEL_STAGES; stage++) {
         const model_real weight = model_weight[stage] * h, reach = model_reach[stage] * h;
-        model_flow(parameters, inner, torque, now, of_inner, rates, of_rates);
+        model_flow(parameters, @STATE_OF_STATE_AND_STEP@inner, torque, now, of_inner, rates, of_rates);
         for (i = 0; i < MODEL_STATES; i++) {
             sum[i] += weight * rates[i];
             inner[i] = state[i] + reach * rates[i];

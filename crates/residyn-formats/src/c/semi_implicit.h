@@ -6,12 +6,12 @@ static inline void model_advance(const model_parameters *parameters, model_real 
 {
     model_real rates[MODEL_STATES];
     int j;
-    model_derivative(parameters, state, torque, time, rates);
+    model_@RATES@(parameters, @STATE_AND_STEP@state, torque, time, rates);
     for (j = 0; j < MODEL_JOINTS; j++) {
         const model_real gain = h * rates[MODEL_JOINTS + j];
         state[j] += h * (rates[j] + gain);
         state[MODEL_JOINTS + j] += gain;
-    }
+    }@OTHERS@
 }
 
 /* The same, and the derivatives of the state. */
@@ -23,7 +23,7 @@ static inline void model_advance_jacobian(const model_parameters *parameters,
 {
     model_real rates[MODEL_STATES], of_rates[MODEL_STATES][MODEL_COLUMNS];
     int j, c;
-    model_flow(parameters, state, torque, time, of_state, rates, of_rates);
+    model_flow(parameters, @STATE_OF_STATE_AND_STEP@state, torque, time, of_state, rates, of_rates);
     for (j = 0; j < MODEL_JOINTS; j++) {
         const model_real gain = h * rates[MODEL_JOINTS + j];
         state[j] += h * (rates[j] + gain);
@@ -33,5 +33,5 @@ static inline void model_advance_jacobian(const model_parameters *parameters,
             of_state[j][c] += h * (of_rates[j][c] + of_gain);
             of_state[MODEL_JOINTS + j][c] += of_gain;
         }
-    }
+    }@OF_OTHERS@
 }

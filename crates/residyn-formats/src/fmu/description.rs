@@ -16,7 +16,7 @@ impl Standard {
             model, variables, ..
         } = fmu;
         let outputs = places(variables, |role| {
-            matches!(role, Role::State { output: true })
+            matches!(role, Role::State { output: true, .. })
         });
         // Only the rates are unknown at the start.
         let rates = places(variables, |role| matches!(role, Role::Rate { .. }));
@@ -98,8 +98,8 @@ fn kind(role: &Role) -> &'static str {
     match role {
         Role::Time => r#"causality="independent" variability="continuous""#,
         Role::Input => r#"causality="input""#,
-        Role::State { output: true } => r#"causality="output" initial="exact""#,
-        Role::State { output: false } => r#"causality="local" initial="exact""#,
+        Role::State { output: true, .. } => r#"causality="output" initial="exact""#,
+        Role::State { output: false, .. } => r#"causality="local" initial="exact""#,
         Role::Rate { .. } => r#"causality="local""#,
         Role::Parameter { .. } => r#"causality="parameter" variability="tunable""#,
     }
@@ -109,7 +109,8 @@ fn kind(role: &Role) -> &'static str {
 fn value(variable: &Variable, first: usize) -> String {
     let mut text = match &variable.role {
         Role::Time => String::new(),
-        Role::Input | Role::State { .. } => r#" start="0""#.to_owned(),
+        Role::Input => r#" start="0""#.to_owned(),
+        Role::State { start, .. } => format!(r#" start="{start}""#),
         Role::Rate { state } => format!(r#" derivative="{}""#, first + state),
         Role::Parameter { value, bounds } => {
             let mut text = format!(r#" start="{value:?}""#);

@@ -90,6 +90,11 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
          points that the importer accepted; co-simulation delays it exactly"
             .to_owned()
     });
+    let stops = model.stops().then(|| {
+        "stops in model exchange: a state of an effect that reaches the end of its range stops there within \
+         1e-9 s, which no solver is told; co-simulation stops it in its step"
+            .to_owned()
+    });
     let binary = match compile(version()) {
         Ok(()) => None,
         Err(reason) => Some(format!(
@@ -100,6 +105,7 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
         .sensors_not_carried()
         .into_iter()
         .chain(delay)
+        .chain(stops)
         .chain(binary)
         .collect()
 }
@@ -158,13 +164,17 @@ impl Standard {
 /// The code of the unit that all versions share.
 fn code(model: &ExportModel, names: &Names, token: &str) -> String {
     let (n, lags) = (model.joints(), variables::lags(model));
+    let rest = match model.internal().next() {
+        Some(_) => "\n    model_rest(&data->parameters, data->state);",
+        None => "",
+    };
     let parameters = &model.equations.parameters;
     let addresses = parameters
         .iter()
         .map(|p| format!("&data->parameters.{}", names.field(&p.name)));
     let addresses: Vec<String> = addresses.chain(["NULL".to_owned()]).collect();
     let lag_state = |joint: Joint| match lags.iter().position(|lag| *lag == joint) {
-        Some(k) => (2 * n + k).to_string(),
+        Some(k) => (model.states() + k).to_string(),
         None => "-1".to_owned(),
     };
     let each = |of: &dyn Fn(Joint) -> String| Joint::all(n).map(of).collect::<Vec<_>>().join(", ");
@@ -176,6 +186,7 @@ fn code(model: &ExportModel, names: &Names, token: &str) -> String {
         &[
             ("TOKEN", &token),
             ("LAGS", &lags.len()),
+            ("REST", &rest),
             ("PARAMETERS", &parameters.len()),
             ("POINTS", &points),
             ("LAG_STATE", &each(&lag_state)),

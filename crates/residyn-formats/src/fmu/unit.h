@@ -26,7 +26,7 @@
 
 enum {
     JOINTS = MODEL_JOINTS,
-    STATES = MODEL_STATES + LAGS, /* positions, velocities, lagged torques */
+    STATES = MODEL_STATES + LAGS, /* positions, velocities, states of effects, lagged torques */
     PARAMETERS = @PARAMETERS@,
     POINTS = @POINTS@ /* of the past that a delay sees in model exchange */
 };
@@ -75,7 +75,7 @@ static void reset(Data *data)
 {
     memset(data, 0, sizeof *data);
     data->parameters = model_defaults();
-    model_reset(&data->memory);
+    model_reset(&data->memory);@REST@
 }
 
 /* ---- model exchange: the torque of the past ---- */

@@ -1,5 +1,5 @@
-use crate::ExportModel;
 use crate::c::Names;
+use crate::{ExportModel, ExportedEffect};
 use residyn_core::data::{Joint, Quantity};
 use residyn_core::model::CommandFilter;
 
@@ -15,9 +15,10 @@ pub(super) struct Variable {
 pub(super) enum Role {
     Time,
     Input,
-    /// A continuous state; whether it is an output as well.
+    /// A continuous state with its value at rest; whether it is an output as well.
     State {
         output: bool,
+        start: f64,
     },
     /// The derivative of the state at this position.
     Rate {
@@ -48,7 +49,7 @@ pub(super) fn variables(model: &ExportModel, names: &Names) -> Vec<Variable> {
         Joint::all(model.joints()).map(|joint| torque(model, joint, "", "commanded", Role::Input));
     let mut all: Vec<Variable> = [time].into_iter().chain(torques).collect();
     let first = all.len();
-    let states = states(model);
+    let states = states(model, names);
     let rates: Vec<Variable> = (states.iter().enumerate())
         .map(|(k, state)| rate(state, first + k))
         .collect();
@@ -58,20 +59,46 @@ pub(super) fn variables(model: &ExportModel, names: &Names) -> Vec<Variable> {
     all
 }
 
-fn states(model: &ExportModel) -> Vec<Variable> {
+fn states(model: &ExportModel, names: &Names) -> Vec<Variable> {
     let of_joint = |joint: Joint, what: &str, per: &str| Variable {
         name: format!("joint[{joint}].{what}"),
         about: format!("{what} of joint {joint}"),
         unit: format!("{}{per}", model.units(joint)[0]),
-        role: Role::State { output: true },
+        role: at_rest(0.0),
     };
     let positions = Joint::all(model.joints()).map(|joint| of_joint(joint, "position", ""));
     let velocities = Joint::all(model.joints()).map(|joint| of_joint(joint, "velocity", "/s"));
     let lagged = lags(model).into_iter().map(|joint| {
-        let role = Role::State { output: false };
+        let role = Role::State {
+            output: false,
+            start: 0.0,
+        };
         torque(model, joint, "lagged_", "that acts after the lag", role)
     });
-    positions.chain(velocities).chain(lagged).collect()
+    let internal = model.internal().map(|(effect, state)| Variable {
+        name: format!("{}{}", below(effect, names), names.field(&state.name)),
+        about: format!(
+            "{} of {} on joint {}",
+            state.about, effect.name, effect.joint
+        ),
+        unit: state.unit.clone(),
+        role: at_rest(state.start),
+    });
+    let of_motion = positions.chain(velocities);
+    of_motion.chain(internal).chain(lagged).collect()
+}
+
+/// A state that is an output, with its value at rest.
+fn at_rest(start: f64) -> Role {
+    Role::State {
+        output: true,
+        start,
+    }
+}
+
+/// Where the names of an effect's variables begin.
+fn below(effect: &ExportedEffect, names: &Names) -> String {
+    format!("joint[{}].{}.", effect.joint, names.field(&effect.name))
 }
 
 fn torque(model: &ExportModel, joint: Joint, prefix: &str, about: &str, role: Role) -> Variable {
@@ -89,9 +116,10 @@ fn torque(model: &ExportModel, joint: Joint, prefix: &str, about: &str, role: Ro
 }
 
 fn rate(state: &Variable, place: usize) -> Variable {
-    let unit = match state.unit.strip_suffix("/s") {
-        Some(of) => format!("{of}/s^2"),
-        None => format!("{}/s", state.unit),
+    let unit = match (state.unit.as_str(), state.unit.strip_suffix("/s")) {
+        ("1", _) => "1/s".to_owned(),
+        (_, Some(of)) => format!("{of}/s^2"),
+        (unit, None) => format!("{unit}/s"),
     };
     Variable {
         name: format!("der({})", state.name),
@@ -105,9 +133,7 @@ fn rate(state: &Variable, place: usize) -> Variable {
 fn parameters(model: &ExportModel, names: &Names) -> impl Iterator<Item = Variable> {
     let place = |name: &str| {
         let effect = model.effect_of(name);
-        effect.map_or_else(String::new, |effect| {
-            format!("joint[{}].{}.", effect.joint, names.field(&effect.name))
-        })
+        effect.map_or_else(String::new, |effect| below(effect, names))
     };
     let parameters = model
         .equations

@@ -11,7 +11,7 @@ use crate::verify::ReferenceModel;
 use crate::{ClientError, Predictions, Samples};
 use residyn_core::expr::{Graph, Node, Program};
 use residyn_core::model::weights::from_bytes;
-use residyn_core::model::{Dynamics, Filter, ModelShape, ModelWeights};
+use residyn_core::model::{Dynamics, Filter, InternalStates, ModelShape, ModelWeights};
 use residyn_core::sim::Integrator;
 use residyn_io::files::read_saved;
 
@@ -30,6 +30,7 @@ struct SavedModel {
 struct Equations {
     filters: Vec<SavedFilter>,
     inputs: Vec<String>,
+    states: Vec<SavedState>,
     operations: Vec<Value>,
     outputs: Vec<usize>,
 }
@@ -50,6 +51,13 @@ pub(super) fn predict(path: &Path, samples: &Samples) -> Result<Predictions, Cli
     Ok(model.predict(samples))
 }
 
+/// A state of an effect.
+#[derive(Deserialize)]
+struct SavedState {
+    name: String,
+    start: f64,
+}
+
 impl SavedModel {
     fn reference(self, numbers: &ModelWeights) -> Result<ReferenceModel, String> {
         let ModelShape {
@@ -64,7 +72,7 @@ impl SavedModel {
             name: system,
             joints,
             measured: Vec::new(),
-            internal: None,
+            internal: self.equations.internal(&names),
             filters: self.equations.filters(&names)?,
             program: self.equations.program()?,
             parameters: values.map(|(p, value)| p.restore(*value)).collect(),
@@ -89,6 +97,13 @@ impl Equations {
             })
         };
         self.filters.iter().map(filter).collect()
+    }
+
+    fn internal(&self, parameters: &[&str]) -> Option<InternalStates> {
+        let names: Vec<String> = self.states.iter().map(|state| state.name.clone()).collect();
+        let starts: Vec<f64> = self.states.iter().map(|state| state.start).collect();
+        let parameters = parameters.iter().copied();
+        (!names.is_empty()).then(|| InternalStates::at_rest(names, &starts, parameters))
     }
 
     fn program(&self) -> Result<Program, String> {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::discrete_filter::DiscreteFilter;
-use crate::{ExportModel, ExportedEffect};
+use crate::{ExportModel, ExportedEffect, ExportedState};
 use residyn_core::data::Joint;
 use residyn_core::expr::{Op, Program};
 use residyn_core::model::{CommandFilter, ModelShape, Parameter};
@@ -60,11 +60,14 @@ struct Equations {
     semi_implicit: bool,
     /// The rates without the networks, as formulas.
     formulas: String,
-    /// Names of the inputs of the operations.
+    /// Names of the inputs of the operations. If effects have states, these include the states at the beginning of a
+    /// substep and its length `step_s`; for the derivative at a moment, the states themselves and zero.
     inputs: Vec<String>,
+    /// The states of effects behind the positions and velocities of a state, with their values at rest.
+    states: Vec<ExportedState>,
     /// `["input", k]`, `["const", x]` or a function and the positions of its arguments in this list.
     operations: Vec<Value>,
-    /// Indices of the operations that are the rates of the positions, then of the velocities.
+    /// Indices of the operations that are the rates of the positions, the velocities and the states of effects.
     outputs: Vec<usize>,
     /// Prefixes of the networks' tensors, in the order in which their outputs are added to the last rates.
     networks: Vec<&'static str>,
@@ -103,7 +106,9 @@ impl Equations {
         let equations = &model.equations;
         let program = &equations.program;
         let names: Vec<String> = (["q", "qd"].iter())
-            .flat_map(|stem| (1..=model.joints()).map(move |j| format!("d({stem}{j})/dt")))
+            .flat_map(|stem| (1..=model.joints()).map(move |j| format!("{stem}{j}")))
+            .chain(model.internal().map(|(_, state)| state.name.clone()))
+            .map(|state| format!("d({state})/dt"))
             .collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let scheme = model.integrator.scheme();
@@ -125,6 +130,7 @@ impl Equations {
             semi_implicit: scheme.semi_implicit,
             formulas: program.text(&names),
             inputs: program.inputs().to_vec(),
+            states: model.internal().map(|(_, state)| state.clone()).collect(),
             operations: operations(program),
             outputs: program.outputs().iter().map(|node| node.index()).collect(),
             networks: model.prefixed().map(|(prefix, _)| prefix).collect(),

@@ -8,6 +8,7 @@ mod geom;
 mod orientation;
 mod read;
 mod rewrite;
+mod transmission;
 mod write;
 
 pub(super) use write::FORMAT;

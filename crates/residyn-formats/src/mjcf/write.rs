@@ -6,13 +6,13 @@ use std::path::Path;
 use super::drive::{actuators, timing_not_carried};
 use super::read::read_mjcf;
 use super::rewrite::{inertial, rewrite};
+use super::transmission::{joints, not_carried as of_motors, numeric, tendons};
 use crate::robot::mechanism::{
     Link, Mechanism, file, friction_widths, head, mujoco_step_s, numbers, option,
 };
 use crate::verify::{Client, PythonClient};
 use crate::xml::escaped;
 use crate::{ExportError, ExportModel, File, Format, RobotReader};
-use residyn_core::model::tree::Joint;
 
 pub(crate) const FORMAT: Format = Format {
     name: "mjcf",
@@ -40,7 +40,8 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
         return Vec::new();
     };
     let timing = timing_not_carried(model, &mechanism);
-    [mechanism.not_carried, timing].concat()
+    let motors = of_motors(&mechanism);
+    [mechanism.not_carried, timing, motors].concat()
 }
 
 fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
@@ -53,17 +54,20 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
         text,
         "<mujoco model=\"{}\">\n  <compiler angle=\"radian\"/>\n  {}\n{}  <custom>\n    \
          <!-- Velocities over which dry friction reverses in the exported model. -->\n    \
-         <numeric name=\"dry_friction_width\" data=\"{}\"/>\n  </custom>\n  <worldbody>\n",
+         <numeric name=\"dry_friction_width\" data=\"{}\"/>\n{}  </custom>\n  <worldbody>\n",
         escaped(model.name()),
         option(model, mechanism),
         friction_default(model, mechanism),
-        friction_widths(model)
+        friction_widths(model),
+        numeric(mechanism)
     );
     let links = mechanism.links();
     for k in mechanism.carried_by(None) {
         text += &body(mechanism, &links, k, 2);
     }
-    text + "  </worldbody>\n" + &actuators(model, mechanism) + "</mujoco>\n"
+    text += "  </worldbody>\n";
+    text += &tendons(mechanism);
+    text + &actuators(model, mechanism) + "</mujoco>\n"
 }
 
 /// A body with those that it carries, `depth` elements deep.
@@ -85,37 +89,19 @@ fn body(mechanism: &Mechanism, links: &[Link], k: usize, depth: usize) -> String
     };
     let own = format!(
         "{indent}<body name=\"{}\" pos=\"{}\" xyaxes=\"{}\">\n\
-         {indent}  <joint name=\"{}\" type=\"{}\" axis=\"{}\"{}/>\n\
+         {}\
          {indent}  {}\n\
          {indent}  <geom {shape} mass=\"0\" contype=\"0\" conaffinity=\"0\"/>\n",
         joint.body,
         numbers(&link.pose.origin),
         numbers(link.pose.rotation.columns(0, 2).iter()),
-        joint.name,
-        if joint.slides { "slide" } else { "hinge" },
-        numbers(&link.axis),
-        of_joint(joint),
+        joints(mechanism, k, &numbers(&link.axis), &indent),
         inertial(&link.centre, link.mass, &link.tensor),
     );
     let others = carried
         .iter()
         .map(|k| body(mechanism, links, *k, depth + 1));
     own + &others.collect::<String>() + &indent + "</body>\n"
-}
-
-/// Attributes of the joint's drivetrain.
-fn of_joint(joint: &Joint) -> String {
-    let spring = joint
-        .drivetrain
-        .spring
-        .map_or([0.0, 0.0], |spring| [spring.stiffness, spring.rest]);
-    attributes(&[
-        ("damping", joint.drivetrain.damping, 0.0),
-        ("frictionloss", joint.drivetrain.friction, 0.0),
-        ("armature", joint.drivetrain.armature, 0.0),
-        ("stiffness", spring[0], 0.0),
-        ("springref", spring[1], 0.0),
-    ])
 }
 
 /// Dry friction as stiff as the step allows, which is twice its length: with MuJoCo's default of 20 ms, joints creep where

@@ -12,6 +12,16 @@ pub struct Derivative<'m> {
     parameters: Vec<Value>,
 }
 
+/// When the rates are wanted: columns of the state and of the torque that acts, and the time.
+pub struct Moment<'v> {
+    pub state: &'v [Value],
+    pub torque: &'v [Value],
+    pub time: Option<&'v Value>,
+    /// The state in which the step began, and the step's length, over which the rates of effects' states are means.
+    pub begun: &'v [Value],
+    pub length_s: f64,
+}
+
 impl<'m> Derivative<'m> {
     /// Writes the parameters as named numbers.
     pub fn new(builder: &mut Builder, model: &'m ExportModel) -> Self {
@@ -22,22 +32,23 @@ impl<'m> Derivative<'m> {
         Self { model, parameters }
     }
 
-    /// The rates: one column each, for columns of `state` and of the acting `torque`.
-    pub fn write(
-        &self,
-        builder: &mut Builder,
-        state: &[Value],
-        torque: &[Value],
-        time: Option<&Value>,
-    ) -> Vec<Value> {
-        let mut inputs: Vec<Value> = state.iter().chain(torque).cloned().collect();
-        let time = time.cloned().unwrap_or_else(|| builder.constant(0.0));
-        inputs.push(time);
+    /// The rates: one column each.
+    pub fn write(&self, builder: &mut Builder, at: &Moment<'_>) -> Vec<Value> {
+        let Moment { state, torque, .. } = at;
+        let layout = self.model.equations.layout();
+        let mut inputs: Vec<Value> = state.iter().chain(*torque).cloned().collect();
+        let time = at.time.cloned();
+        inputs.push(time.unwrap_or_else(|| builder.constant(0.0)));
+        if !layout.internal().is_empty() {
+            inputs.extend_from_slice(&at.begun[layout.internal()]);
+            inputs.push(builder.constant(at.length_s));
+        }
         inputs.extend_from_slice(&self.parameters);
         let mut rates = self.equations(builder, &inputs);
+        let motion = &state[..layout.internal().start];
         for (prefix, network) in self.model.prefixed() {
-            let parts = write_network(builder, network, prefix, state, torque);
-            let first = rates.len() - parts.len();
+            let parts = write_network(builder, network, prefix, motion, torque);
+            let first = motion.len() - parts.len();
             for (rate, part) in rates[first..].iter_mut().zip(&parts) {
                 *rate = builder.apply("Add", &[rate, part]);
             }

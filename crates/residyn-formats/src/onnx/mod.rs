@@ -15,7 +15,7 @@ use super::discrete_filter::DiscreteFilter;
 use super::verify::{Client, PythonClient};
 use super::{ExportError, ExportModel, File, Format};
 use builder::Builder;
-use derivative::Derivative;
+use derivative::{Derivative, Moment};
 use proto::{Graph, Model, OperatorSet, Property};
 use residyn_core::data::Joint;
 use residyn_core::expr::Op;
@@ -87,22 +87,23 @@ fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
 }
 
 fn derivative_graph(model: &ExportModel) -> Graph {
-    let n = model.joints();
     let mut builder = Builder::default();
     let inputs = step::inputs(&mut builder, model, "torque that acts");
     let derivative = Derivative::new(&mut builder, model);
-    let rates = derivative.write(
-        &mut builder,
-        &inputs.state,
-        &inputs.torque,
-        inputs.time.as_ref(),
-    );
+    let at = Moment {
+        state: &inputs.state,
+        torque: &inputs.torque,
+        time: inputs.time.as_ref(),
+        begun: &inputs.state,
+        length_s: 0.0,
+    };
+    let rates = derivative.write(&mut builder, &at);
     let derivative = builder.concat(&rates, &inputs.state[0]);
     builder.output(
         "derivative",
         &derivative,
-        2 * n,
-        "velocities, then accelerations",
+        model.states(),
+        "velocities, then accelerations, then rates of the states of effects",
     );
     builder.finish("derivative")
 }
@@ -141,6 +142,7 @@ fn packed(model: &ExportModel, graph: Graph) -> Vec<u8> {
             text("parameters", json(json!(parameters))),
             text("effects", json(json!(model.effects))),
             text("memory", json(json!(memory))),
+            text("rest", json(json!(model.rest()))),
             text("origin", json(model.origin.clone())),
         ],
     };

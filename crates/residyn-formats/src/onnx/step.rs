@@ -1,7 +1,7 @@
 //! One step of the integrator as a graph.
 
 use super::builder::{Builder, Value};
-use super::derivative::Derivative;
+use super::derivative::{Derivative, Moment};
 use super::proto::Graph;
 use crate::ExportModel;
 use crate::discrete_filter::{Combination, DiscreteFilter};
@@ -22,15 +22,19 @@ pub fn inputs(builder: &mut Builder, model: &ExportModel, torque: &str) -> Input
         .map(|joint| model.units(joint).join(", "))
         .collect();
     let about = format!("of joints in {}", units.join("; "));
+    let of_effects: Vec<String> = (model.internal())
+        .map(|(effect, state)| format!(", then {} of {}", state.name, effect.name))
+        .collect();
+    let of_effects = of_effects.concat();
     let state = builder.input(
         "state",
-        2 * n,
-        &format!("positions, then velocities {about}"),
+        model.states(),
+        &format!("positions, then velocities {about}{of_effects}"),
     );
     let torque = builder.input("torque", n, &format!("{torque} {about}"));
     let time = model.depends_on_time();
     Inputs {
-        state: builder.split(&state, 2 * n),
+        state: builder.split(&state, model.states()),
         torque: builder.split(&torque, n),
         time: time.then(|| builder.input("time", 1, "in s, at the start of the step")),
     }
@@ -38,7 +42,6 @@ pub fn inputs(builder: &mut Builder, model: &ExportModel, torque: &str) -> Input
 
 /// The graph of a whole step.
 pub fn graph(model: &ExportModel) -> Graph {
-    let n = model.joints();
     let mut builder = Builder::default();
     let about = format!("{} over the step", model.driving());
     let inputs = inputs(&mut builder, model, &about);
@@ -60,7 +63,12 @@ pub fn graph(model: &ExportModel) -> Graph {
         );
     }
     let next = builder.concat(&next, &inputs.state[0]);
-    builder.output("next_state", &next, 2 * n, "as `state`, a step later");
+    builder.output(
+        "next_state",
+        &next,
+        model.states(),
+        "as `state`, a step later",
+    );
     builder.finish("step")
 }
 
@@ -131,7 +139,15 @@ impl Step<'_, '_> {
         let begin = k as f64 * self.h;
         let (mut inner, mut next, mut rates) = (state.to_vec(), state.to_vec(), Vec::new());
         for (place, stage) in scheme.stages.iter().enumerate() {
-            rates = self.rates(&inner, torque, time, begin + stage.time * self.h);
+            let time = self.time(time, begin + stage.time * self.h);
+            let at = Moment {
+                state: &inner,
+                torque,
+                time: time.as_ref(),
+                begun: state,
+                length_s: self.h,
+            };
+            rates = self.derivative.write(self.builder, &at);
             next = self.along(&next, stage.weight * self.h, &rates);
             if place + 1 < scheme.stages.len() {
                 inner = self.along(state, stage.reach * self.h, &rates);
@@ -140,25 +156,18 @@ impl Step<'_, '_> {
         if scheme.semi_implicit {
             let n = torque.len();
             // The change of velocity also moves the positions: h^2 f_v.
-            let moved = self.along(&next[..n], self.h * self.h, &rates[n..]);
+            let moved = self.along(&next[..n], self.h * self.h, &rates[n..2 * n]);
             next.splice(..n, moved);
         }
         next
     }
 
-    fn rates(
-        &mut self,
-        state: &[Value],
-        torque: &[Value],
-        time: Option<&Value>,
-        after: f64,
-    ) -> Vec<Value> {
-        let time = time.map(|time| {
+    /// The time so long after the step has begun.
+    fn time(&mut self, time: Option<&Value>, after: f64) -> Option<Value> {
+        time.map(|time| {
             let after = self.builder.constant(after);
             self.builder.apply("Add", &[time, &after])
-        });
-        self.derivative
-            .write(self.builder, state, torque, time.as_ref())
+        })
     }
 
     /// x + h * slope

@@ -8,7 +8,7 @@ except ImportError:
 if gymnasium is not None:
 
     class Environment(gymnasium.Env):
-        """The task under the interface of gymnasium: states are observed, torques are actions.
+        """The task under the interface of gymnasium: positions and velocities are observed, torques are actions.
 
         An action is held for the task's own step, in whole steps of the model. Episodes never terminate, they are
         truncated after the task's number of steps.
@@ -26,8 +26,8 @@ if gymnasium is not None:
         def reset(self, *, seed=None, options=None):
             super().reset(seed=seed)
             spread = self.np_random.uniform(-1.0, 1.0, 2 * JOINTS) * TASK["spread"]
-            self.state, self.memory, self.steps = np.array(TASK["start"]) + spread, None, 0
-            return self.state.copy(), {}
+            self.state, self.memory, self.steps = np.concatenate([TASK["start"] + spread, START[2 * JOINTS :]]), None, 0
+            return self.state[: 2 * JOINTS].copy(), {}
 
         def step(self, action):
             for k in range(self.repeats):
@@ -35,4 +35,4 @@ if gymnasium is not None:
                 self.state, self.memory = step(self.state, action, self.memory, time, self.parameters)
             self.steps += 1
             won = float(reward(self.state, action, self.steps * self.repeats * STEP))
-            return self.state.copy(), won, False, self.steps >= TASK["steps"], {}
+            return self.state[: 2 * JOINTS].copy(), won, False, self.steps >= TASK["steps"], {}

@@ -73,7 +73,11 @@ fn module(model: &ExportModel) -> String {
     let mut out = head(model);
     constants(&mut out, model);
     derivative(&mut out, model);
-    out += &advance(model.integrator.scheme());
+    let begun = match model.internal().next() {
+        Some(_) => ", begun=state, length=h",
+        None => "",
+    };
+    out += &filled(&advance(model.integrator.scheme()), &[("BEGUN", &begun)]);
     out += STEP;
     if let Some(task) = &model.task {
         reward(&mut out, task);
@@ -91,7 +95,7 @@ fn head(model: &ExportModel) -> String {
     let provenance = json!(model.provenance().to_string());
     format!(
         "\"\"\"A model of {}: step and derivative for numpy.\n\n\
-         A state is {n} position{s}, then the velocities; positions and {driving} are of {}.\n\
+         A state is {n} position{s}, then the velocities{of_effects}; positions and {driving} are of {}.\n\
          All functions take single rows or any number of them in front.\n\"\"\"\n\n\
          import json\n\n\
          import numpy as np\n\n\
@@ -101,6 +105,9 @@ fn head(model: &ExportModel) -> String {
         plain(model.name()),
         units.join(", "),
         driving = model.driving(),
+        of_effects = (model.internal())
+            .map(|(effect, state)| format!(", then {} of {}", state.name, effect.name))
+            .collect::<String>(),
         s = if n == 1 { "" } else { "s" },
     )
 }
@@ -145,6 +152,12 @@ fn constants(out: &mut String, model: &ExportModel) {
         }
         *out += "]\n";
     }
+    let rest: Vec<String> = model.rest().iter().map(|value| literal(*value)).collect();
+    let _ = write!(
+        out,
+        "\n# The state at rest.\nSTART = np.array([{}])\n",
+        rest.join(", ")
+    );
     filters(out, model);
     for (name, network) in networks(model) {
         layers(out, &name, network);
@@ -232,23 +245,43 @@ fn derivative(out: &mut String, model: &ExportModel) {
                  for inner, offset in hidden:\n        x = np.maximum(x @ inner.T + offset, 0.0)\n    \
                  return np.moveaxis(x @ weight.T + bias, -1, 0)\n";
     }
-    *out += "\n\ndef derivative(state, torque, time=0.0, parameters=None):\n    \
-             \"\"\"ds/dt: velocities, then accelerations, while `torque` acts.\"\"\"\n    \
-             p = PARAMETERS if parameters is None else parameters\n";
+    *out += match model.internal().next() {
+        None => {
+            "\n\ndef derivative(state, torque, time=0.0, parameters=None):\n    \
+             \"\"\"ds/dt: velocities, then accelerations, while `torque` acts.\"\"\"\n"
+        }
+        Some(_) => {
+            "\n\ndef derivative(state, torque, time=0.0, parameters=None, begun=None, length=0.0):\n    \
+             \"\"\"ds/dt: velocities, accelerations, then rates of the states of effects, while `torque` acts.\n\n    \
+             Within a step of this length from `begun`, these are their mean rates over the step.\n    \"\"\"\n    \
+             begun, step_s = state if begun is None else begun, length\n"
+        }
+    };
+    *out += "    p = PARAMETERS if parameters is None else parameters\n";
     let names = |stem: &str| -> Vec<String> { (1..=n).map(|j| format!("{stem}{j}")).collect() };
     let list = |names: &[String]| format!("[{}]", names.join(", "));
     let driven = model.equations.driven_by().key();
     let (q, qd, tau) = (names("q"), names("qd"), names(driven));
-    let state = [q.as_slice(), &qd].concat();
-    for (names, from) in [(&state, "state"), (&tau, "torque")] {
+    let of_effects = model.internal().map(|(_, state)| state.name.clone());
+    let of_effects: Vec<String> = of_effects.collect();
+    let before = of_effects.iter().map(|name| format!("{name}_before"));
+    let motion = vec!["_".to_owned(); 2 * n];
+    let begun: Vec<String> = motion.into_iter().chain(before).collect();
+    let state = [q.as_slice(), &qd, &of_effects].concat();
+    let mut given = vec![(&state, "state"), (&tau, "torque")];
+    if !of_effects.is_empty() {
+        given.push((&begun, "begun"));
+    }
+    for (names, from) in given {
         let _ = writeln!(
             out,
             "    {} = np.moveaxis(np.asarray({from}, float), -1, 0)",
             list(names)
         );
     }
-    let rates = names("rate_of_q").into_iter().chain(names("rate_of_qd"));
-    let rates: Vec<String> = rates.collect();
+    let of_motion = ["rate_of_q", "rate_of_qd"].map(names).concat();
+    let of_effects = of_effects.iter().map(|name| format!("rate_of_{name}"));
+    let rates: Vec<String> = of_motion.into_iter().chain(of_effects).collect();
     let parameters = model.equations.parameters.iter().map(|p| p.name.clone());
     statements(out, &model.equations.program, &rates, parameters.collect());
     for (name, network) in networks(model) {
@@ -269,7 +302,7 @@ fn derivative(out: &mut String, model: &ExportModel) {
             ResidualOn::Accelerations => n,
             ResidualOn::Derivative => 0,
         };
-        for (k, rate) in rates[first..].iter().enumerate() {
+        for (k, rate) in rates[first..2 * n].iter().enumerate() {
             let _ = writeln!(out, "    {rate} = {rate} + parts[{k}]");
         }
     }
@@ -302,11 +335,12 @@ fn reward(out: &mut String, task: &ExportedTask) {
         out,
         "\n\ndef reward(state, torque, time=0.0):\n    \
          \"\"\"Of a step that leads to `state` while `torque` is held: {}.\"\"\"\n    \
-         [{}, {}] = np.moveaxis(np.asarray(state, float), -1, 0)\n    \
+         [{}, {}] = np.moveaxis(np.asarray(state, float)[..., :{}], -1, 0)\n    \
          [{}] = np.moveaxis(np.asarray(torque, float), -1, 0)\n",
         task.objective,
         names("q"),
         names("qd"),
+        2 * n,
         names("tau"),
     );
     let reward = ["reward".to_owned()];

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::powertrain::{Drive, Powertrains};
+use super::powertrain::{Drive, Motor, Powertrains};
 use crate::xml::escaped;
 use crate::{ExportError, ExportModel, File};
 use residyn_core::model::tree::{Drivetrain, Joint, Pose, recover, rounded};
@@ -16,6 +16,8 @@ use residyn_core::sim::{RK4, SEMI_IMPLICIT_EULER, Scheme};
 pub(crate) struct Mechanism {
     pub joints: Vec<Joint>,
     pub drives: Vec<Drive>,
+    /// The motors that stand behind transmissions, one a joint at most.
+    pub motors: Vec<Option<Motor>>,
     /// m/s^2, against z
     pub gravity: f64,
     /// The model's scheme as MuJoCo names it.
@@ -83,6 +85,7 @@ impl Mechanism {
         }
         Ok(Self {
             joints: found.joints,
+            motors: powertrains.iter().map(|own| own.motor.clone()).collect(),
             drives: powertrains.into_iter().map(|own| own.drive).collect(),
             gravity: found.gravity,
             integrator: integrator(model.integrator.scheme())?,

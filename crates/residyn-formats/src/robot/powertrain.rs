@@ -23,6 +23,32 @@ pub(crate) struct Powertrain {
     /// The coordinate (rad or m) at which the bodies are where the declared ones are at zero.
     pub zero: f64,
     pub drive: Drive,
+    /// The motor, if it stands behind a transmission.
+    pub motor: Option<Motor>,
+}
+
+/// A motor with an inertia of its own, on which the drive acts, behind a spring or a play.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Motor {
+    /// kg m^2
+    pub inertia: f64,
+    pub passes: Passes,
+    /// Whether the model's angle is that of the motor, not of the link; and whether friction acts on it.
+    pub has_sensor: bool,
+    pub has_friction: bool,
+    /// Place of the twist among the model's states.
+    pub state: usize,
+    /// What it is, for messages.
+    pub said: String,
+}
+
+/// What passes from a motor to its link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Passes {
+    /// Of a spring, N m/rad, and a damper, N m s/rad.
+    Spring { stiffness: f64, damping: f64 },
+    /// Nothing but at the ends of a play, rad.
+    Play(f64),
 }
 
 /// A drive: torque = clamp(gain * command + bias), the command late and lagged.
@@ -104,6 +130,7 @@ impl Powertrains {
             joint: Drivetrain::default(),
             zero: 0.0,
             drive,
+            motor: None,
         });
         let mut powertrains = Self {
             joints: joints.collect(),
@@ -122,7 +149,12 @@ impl Powertrains {
     fn carry(&mut self, effect: &ExportedEffect, model: &ExportModel, parameters: &[Parameter]) {
         let value = |name: &String| value(parameters, name).unwrap_or(0.0);
         let values: Vec<f64> = effect.parameters.iter().map(value).collect();
-        let Powertrain { joint, zero, drive } = &mut self.joints[effect.joint.index()];
+        let Powertrain {
+            joint,
+            zero,
+            drive,
+            motor,
+        } = &mut self.joints[effect.joint.index()];
         let lost = &mut self.not_carried;
         let on = format!(
             "{} on joint {}",
@@ -162,7 +194,42 @@ impl Powertrains {
             ("actuator_delay", [time]) => drive.delay = Some(*time).filter(|time| *time > 0.0),
             ("actuator_lag", [time]) => drive.lag = Some(*time),
             ("constant_torque", [torque]) => drive.add(*torque),
+            ("joint_elasticity", [stiffness, damping, inertia, sides @ ..]) => {
+                let passes = Passes::Spring {
+                    stiffness: *stiffness,
+                    damping: *damping,
+                };
+                *motor = Some(Motor::of(model, effect, passes, (*inertia, sides)));
+            }
+            ("motor_backlash", [play, _, _, inertia, sides @ ..]) => {
+                let passes = Passes::Play(*play);
+                *motor = Some(Motor::of(model, effect, passes, (*inertia, sides)));
+                lost.push(format!(
+                    "{on}: the stiffness and damping of its contacts; the ends of the play are those of a joint"
+                ));
+            }
             _ => lost.push(format!("{on}: {}", effect.expression)),
+        }
+    }
+}
+
+impl Motor {
+    /// The motor of an effect, with an inertia and the sides of sensor and friction.
+    fn of(
+        model: &ExportModel,
+        effect: &ExportedEffect,
+        passes: Passes,
+        (inertia, sides): (f64, &[f64]),
+    ) -> Self {
+        let mut internal = model.internal();
+        let before = internal.position(|(own, _)| own == effect);
+        Self {
+            inertia,
+            passes,
+            has_sensor: sides.first().is_some_and(|side| *side > 0.5),
+            has_friction: sides.last().is_some_and(|side| *side > 0.5),
+            state: 2 * model.joints() + before.expect("a transmission has states"),
+            said: format!("{}: {}", effect.name, effect.expression),
         }
     }
 }

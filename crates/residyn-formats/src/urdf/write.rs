@@ -56,6 +56,9 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
                 lost.push(format!("{what} of joint {number}"));
             }
         };
+        if let Some(motor) = &mechanism.motors[k] {
+            lost(true, &motor.said);
+        }
         lost(joint.drivetrain.armature > 0.0, "the rotor's inertia");
         lost(joint.drivetrain.spring.is_some(), "the spring");
         lost(drive.delay.is_some(), "the drive's delay");

@@ -23,17 +23,26 @@ const ROLLOUTS: usize = 16;
 const PERTURBATION: f64 = 1e-6;
 
 /// Draw sample points for a model; `prismatic` says which joints slide. Positions span a whole turn (or a metre either
-/// way), velocities as much per second, and torques change the accelerations about as much as the state does.
+/// way), velocities as much per second, states of effects as much as they do along a rollout, and torques change the
+/// accelerations about as much as the state does.
 pub(crate) fn draw(model: &ReferenceModel, prismatic: &[bool], rng: &mut impl Rng) -> Samples {
     let n = prismatic.len();
-    let range: Vec<f64> = (0..2 * n)
+    let motion: Vec<f64> = (0..2 * n)
         .map(|k| if prismatic[k % n] { 1.0 } else { PI })
         .collect();
-    let states = rows(POINTS, &range, rng);
-    let torque = torque_range(&model.whole, &states);
+    let internal = model.whole.internal_starts(&model.whole.values());
+    let at_rest = |motion: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let states = motion.iter().map(|motion| [motion, internal.as_slice()]);
+        states.map(|state| state.concat()).collect()
+    };
+    let points = rows(POINTS, &motion, rng);
+    let torque = torque_range(&model.whole, &at_rest(&points));
     let held = held_torques(model.step_s, &scaled(&torque), rng);
-    let slow = [&range[..n], &scaled(&range[n..])].concat();
-    let starts = rows(ROLLOUTS, &slow, rng);
+    let slow = [&motion[..n], &scaled(&motion[n..])].concat();
+    let starts = at_rest(&rows(ROLLOUTS, &slow, rng));
+    let internal = internal_range(model, &starts[0], &held);
+    let states = with_internal(points, &internal, rng);
+    let range = [motion, internal].concat();
     let start = least_sensitive(model, starts, &range, &held);
     Samples {
         joints: n,
@@ -43,6 +52,26 @@ pub(crate) fn draw(model: &ReferenceModel, prismatic: &[bool], rng: &mut impl Rn
         held,
         states,
     }
+}
+
+/// By how much each state of an effect moves along a rollout; 1 if it does not move.
+fn internal_range(model: &ReferenceModel, start: &[f64], held: &[Vec<f64>]) -> Vec<f64> {
+    let rollout = model.rollout(start, held);
+    let largest = |k: usize| {
+        let moved = rollout.iter().map(|state| (state[k] - start[k]).abs());
+        let largest = moved.filter(|moved| moved.is_finite()).fold(0.0, f64::max);
+        if largest > 0.0 { largest } else { 1.0 }
+    };
+    let layout = model.whole.layout();
+    layout.internal().map(largest).collect()
+}
+
+/// Points of the motion with states of effects.
+fn with_internal(motion: Vec<Vec<f64>>, range: &[f64], rng: &mut impl Rng) -> Vec<Vec<f64>> {
+    let internal = rows(motion.len(), range, rng);
+    let both = motion.into_iter().zip(internal);
+    both.map(|(motion, internal)| [motion, internal].concat())
+        .collect()
 }
 
 /// Length of the rollout in steps of this length, in s.
@@ -103,8 +132,7 @@ fn single(number: f64) -> f64 {
 fn torque_range(whole: &Dynamics, states: &[Vec<f64>]) -> Vec<f64> {
     let n = whole.joints;
     let values = whole.values();
-    let rates =
-        |state: &[f64], tau: &[f64]| whole.program.eval(&[state, tau, &[0.0], &values].concat());
+    let rates = |state: &[f64], tau: &[f64]| whole.rates(state, tau, &values);
     let of_joint = |joint: usize| {
         let mut unit = vec![0.0; n];
         let (mut free, mut driven) = (0.0, 0.0);

@@ -41,10 +41,7 @@ impl ReferenceModel {
             state
         });
         let values = self.whole.values();
-        let derivative = points().map(|(state, tau)| {
-            let inputs = [state.as_slice(), tau, &[0.0], &values].concat();
-            self.whole.program.eval(&inputs)
-        });
+        let derivative = points().map(|(state, tau)| self.whole.rates(state, tau, &values));
         Predictions {
             next: Some(next.collect()),
             derivative: Some(derivative.collect()),

@@ -8,12 +8,12 @@ pub struct Samples {
     pub joints: usize,
     /// In s.
     pub step_s: f64,
-    /// `[point][2n]`: positions, then velocities.
+    /// `[point][state]`: positions, velocities, then the states of effects.
     pub states: Vec<Vec<f64>>,
     /// `[point][n]`: torques held for a step. For a step, they are commanded after zero torque; for the derivative,
     /// they act.
     pub torques: Vec<Vec<f64>>,
-    /// `[2n]`: state at the start of the rollout, at time 0 and after no torque.
+    /// State at the start of the rollout, at time 0 and after no torque.
     pub start: Vec<f64>,
     /// `[step][n]`: torques commanded over each step of the rollout.
     pub held: Vec<Vec<f64>>,

@@ -6,6 +6,8 @@ use residyn_core::sim::batch::{Rows, W};
 #[derive(Debug)]
 pub struct Blocks {
     pub(super) joints: usize,
+    /// Number of states: positions, velocities, then internal states.
+    pub(super) states: usize,
     pub(super) steps: usize,
     /// Number of segments.
     pub(super) size: usize,
@@ -16,7 +18,7 @@ pub struct Blocks {
 
 /// The data of one step.
 pub(super) struct StepData<'a> {
-    /// `2n`, at its start.
+    /// At its start.
     pub state: &'a [Rows],
     /// `n`, held.
     pub input: &'a [Rows],
@@ -24,7 +26,7 @@ pub(super) struct StepData<'a> {
     pub dt: &'a Rows,
     /// When the step begins, s.
     pub time: &'a Rows,
-    /// `2n`, at its end.
+    /// At its end.
     pub next: &'a [Rows],
 }
 
@@ -32,13 +34,14 @@ impl Blocks {
     /// Blocks of `size` segments; `segment` gives a segment's values: for each step, the state, the input, and the
     /// step's length and start, followed by the last state.
     pub(crate) fn new(
-        joints: usize,
+        [joints, states]: [usize; 2],
         steps: usize,
         size: usize,
         segment: impl Fn(usize) -> Vec<f32>,
     ) -> Self {
         let mut blocks = Self {
             joints,
+            states,
             steps,
             size,
             rows: Vec::new(),
@@ -76,24 +79,26 @@ impl Blocks {
     /// The data of step `k`.
     #[inline(always)]
     pub(super) fn step(&self, block: usize, k: usize) -> StepData<'_> {
-        let (n, stride, step) = (self.joints, self.stride(), self.step_rows());
-        let rows = &self.rows[block * stride + k * step..][..step + 2 * n];
+        let (n, states) = (self.joints, self.states);
+        let (stride, step) = (self.stride(), self.step_rows());
+        let rows = &self.rows[block * stride + k * step..][..step + states];
+        let (state, held) = rows[..step].split_at(states);
         StepData {
-            state: &rows[..2 * n],
-            input: &rows[2 * n..3 * n],
-            dt: &rows[3 * n],
-            time: &rows[3 * n + 1],
+            state,
+            input: &held[..n],
+            dt: &held[n],
+            time: &held[n + 1],
             next: &rows[step..],
         }
     }
 
     /// Number of rows of a step.
     fn step_rows(&self) -> usize {
-        3 * self.joints + 2
+        self.states + self.joints + 2
     }
 
     /// Number of rows of a block.
     fn stride(&self) -> usize {
-        self.steps * self.step_rows() + 2 * self.joints
+        self.steps * self.step_rows() + self.states
     }
 }

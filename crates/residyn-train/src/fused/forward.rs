@@ -74,7 +74,8 @@ impl<S: Simd> Rollout<'_, S> {
             };
             let mut record = self.stage(record, at);
             self.set_states(at, coefficients, scratch, record.states);
-            self.rates(&mut programs.program, at, &mut record, &mut scratch.rates);
+            let Scratch { state, rates, .. } = &mut *scratch;
+            self.rates(&mut programs.program, at, &mut record, (state, rates));
             if self.is_penalised(at) {
                 self.add_residual(&record, residual);
             }
@@ -126,7 +127,8 @@ impl<S: Simd> Rollout<'_, S> {
                 });
             }
             if self.problem.integrator.scheme().semi_implicit {
-                let (q, gains) = (&mut state[..states / 2], &mean[states / 2..]);
+                let joints = self.of_motion() / 2;
+                let (q, gains) = (&mut state[..joints], &mean[joints..]);
                 for (q, gain) in q.iter_mut().zip(gains) {
                     update(self.simd, q, [gain, &h], |q, [gain, h]| {
                         (gain * h).mul_add(h, q)
@@ -136,19 +138,19 @@ impl<S: Simd> Rollout<'_, S> {
         }
     }
 
-    /// The rates at a stage, whose states are in its record.
+    /// The rates at a stage, whose states are in its record, of a substep that begins in `begun`.
     #[inline(always)]
     fn rates(
         &self,
         program: &mut Tape<f32, W>,
         at: StageIndex,
         record: &mut StageRecord,
-        rates: &mut [Rows],
+        (begun, rates): (&[Rows], &mut [Rows]),
     ) {
-        let states = self.states();
+        let (states, of_motion) = (self.states(), self.of_motion());
         for (b, block) in self.chunk.clone().enumerate() {
-            let state = &record.states[b * states..][..states];
-            self.set_inputs(program, at, block, state);
+            let of_block = [&*record.states, begun].map(|all| &all[b * states..][..states]);
+            self.set_inputs(program, at, block, of_block);
             program.run();
             let rates = &mut rates[b * states..][..states];
             for (k, rate) in rates.iter_mut().enumerate() {
@@ -164,7 +166,7 @@ impl<S: Simd> Rollout<'_, S> {
                 let values = &mut part.values[b * network.activations()..][..network.activations()];
                 network.forward(self.simd, features, values);
                 let outputs = &values[network.outputs()];
-                let first = states - outputs.len();
+                let first = of_motion - outputs.len();
                 for (rate, output) in rates[first..].iter_mut().zip(outputs) {
                     update(self.simd, rate, [output], |rate, [output]| rate + output);
                 }

@@ -63,12 +63,12 @@ impl Problem {
     /// Number of rows in the record of one stage and block.
     pub(super) fn recorded_by_stage(&self, networks: &[Network]) -> usize {
         let of_networks = networks.iter().map(|n| n.features() + n.activations());
-        2 * self.structure.joints + of_networks.sum::<usize>()
+        self.structure.states() + of_networks.sum::<usize>()
     }
 
     /// Number of rows in the record of one block.
     pub(super) fn recorded(&self, networks: &[Network]) -> usize {
-        let ends = self.blocks.steps * 2 * self.structure.joints;
+        let ends = self.blocks.steps * self.structure.states();
         self.stages() * self.recorded_by_stage(networks) + ends
     }
 

@@ -30,7 +30,7 @@ impl Layout {
     pub(super) fn new(problem: &Problem, networks: &[Network], blocks: usize) -> Self {
         Self {
             blocks,
-            states: 2 * problem.structure.joints,
+            states: problem.structure.states(),
             stage: problem.recorded_by_stage(networks),
             stages: problem.stages(),
         }

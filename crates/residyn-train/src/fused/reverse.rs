@@ -42,8 +42,7 @@ impl<S: Simd> Rollout<'_, S> {
         for ((b, block), end) in self.chunk.clone().enumerate().zip(ends) {
             let (next, counted) = (blocks.step(block, step).next, blocks.counted(block));
             let by_state = &mut by_state[b * states..][..states];
-            for k in 0..states {
-                let precision = self.problem.precision[k];
+            for (k, precision) in self.problem.precision.iter().enumerate() {
                 let seed = Vector::splat(self.simd, 2.0 * seed * precision * precision);
                 let of = [&end[k], &next[k], counted];
                 update(
@@ -69,6 +68,13 @@ impl<S: Simd> Rollout<'_, S> {
     ) {
         let stages = self.problem.integrator.scheme().stages;
         self.advance_back(step, &mut workspace.scratch);
+        let first = StageIndex {
+            step,
+            substep,
+            stage: 0,
+        };
+        let begun = self.stage(record, first).states;
+        workspace.scratch.begun[..begun.len()].copy_from_slice(begun);
         for (stage, coefficients) in stages.iter().enumerate().rev() {
             let at = StageIndex {
                 step,
@@ -107,7 +113,7 @@ impl<S: Simd> Rollout<'_, S> {
                 });
             }
             if self.problem.integrator.scheme().semi_implicit {
-                let (of_q, of_v) = mean.split_at_mut(states / 2);
+                let (of_q, of_v) = mean.split_at_mut(self.of_motion() / 2);
                 for (v, q) in of_v.iter_mut().zip(of_q) {
                     update(self.simd, v, [q, &h], |v, [q, h]| q.mul_add(h, v));
                 }
@@ -151,7 +157,7 @@ impl<S: Simd> Rollout<'_, S> {
         workspace: &mut Workspace,
         seed: f32,
     ) {
-        let states = self.states();
+        let (states, of_motion) = (self.states(), self.of_motion());
         let networks = self.weights.networks.iter().zip(&mut record.networks);
         for (k, (network, activations)) in networks.enumerate() {
             let penalised = self.is_penalised(at) && k + 1 == self.weights.networks.len();
@@ -161,7 +167,7 @@ impl<S: Simd> Rollout<'_, S> {
             for ((block, values), slopes) in self.chunk.clone().zip(values).zip(slopes) {
                 let counted = self.problem.blocks.counted(block);
                 let outputs = &mut values[network.outputs()];
-                let slopes = &slopes[states - outputs.len()..];
+                let slopes = &slopes[of_motion - outputs.len()..];
                 for (output, slope) in outputs.iter_mut().zip(slopes) {
                     let of = [slope, counted];
                     update(self.simd, output, of, |output, [slope, counted]| {
@@ -183,8 +189,8 @@ impl<S: Simd> Rollout<'_, S> {
         }
     }
 
-    /// From the derivatives by a stage's rates and features to those by its states, in `scratch.by_stage`, and by the
-    /// parameters.
+    /// From the derivatives by a stage's rates and features to those by its states, in `scratch.by_stage`, by the internal
+    /// states at the start of its substep, which are added in `scratch.state`, and by the parameters.
     #[inline(always)]
     fn program_back(
         &self,
@@ -194,16 +200,20 @@ impl<S: Simd> Rollout<'_, S> {
         workspace: &mut Workspace,
     ) {
         let states = self.states();
-        let (adjoint, by_states) = match at.is_first() {
-            true => (&mut programs.parameter_adjoint, 0),
-            false => (&mut programs.adjoint, states),
+        let layout = self.problem.structure.layout;
+        let internal = layout.internal();
+        let (adjoint, by_states, by_begun) = match at.is_first() {
+            true => (&mut programs.parameter_adjoint, 0, 0),
+            false => (&mut programs.adjoint, states, internal.len()),
         };
         if by_states + workspace.parameter_sums.len() == 0 {
             return;
         }
-        let first = 3 * self.problem.structure.joints + 1;
+        let first = layout.parameters();
         for (b, block) in self.chunk.clone().enumerate() {
-            self.set_inputs(adjoint, at, block, &recorded[b * states..][..states]);
+            let of_block = [recorded, &workspace.scratch.begun];
+            let of_block = of_block.map(|all| &all[b * states..][..states]);
+            self.set_inputs(adjoint, at, block, of_block);
             let seeds = &mut adjoint.moving()[first..];
             let rates = &workspace.scratch.rates[b * states..][..states];
             let features = (self.weights.networks.iter().zip(&workspace.by_features))
@@ -216,8 +226,13 @@ impl<S: Simd> Rollout<'_, S> {
             for (k, by) in by_stage.iter_mut().enumerate() {
                 *by = *adjoint.output(k);
             }
-            for (k, sum) in workspace.parameter_sums.iter_mut().enumerate() {
+            let begun = &mut workspace.scratch.state[b * states..][internal.clone()];
+            for (k, by) in begun[..by_begun].iter_mut().enumerate() {
                 let slope = adjoint.output(by_states + k);
+                update(self.simd, by, [slope], |by, [slope]| by + slope);
+            }
+            for (k, sum) in workspace.parameter_sums.iter_mut().enumerate() {
+                let slope = adjoint.output(by_states + by_begun + k);
                 update(self.simd, sum, [slope], |sum, [slope]| sum + slope);
             }
         }

@@ -27,15 +27,16 @@ pub(super) struct StageIndex {
 }
 
 impl<S: Simd> Rollout<'_, S> {
-    /// Sets state, input and time of a stage in a program.
+    /// Sets state, input and time of a stage in a program; `begun` is the state in which its substep begins.
     #[inline(always)]
     pub(super) fn set_inputs(
         &self,
         program: &mut Tape<f32, W>,
         at: StageIndex,
         block: usize,
-        state: &[Rows],
+        [state, begun]: [&[Rows]; 2],
     ) {
+        let layout = self.problem.structure.layout;
         let data = self.problem.blocks.step(block, at.step);
         let inputs = program.moving();
         for (to, from) in inputs.iter_mut().zip(state.iter().chain(data.input)) {
@@ -48,7 +49,11 @@ impl<S: Simd> Rollout<'_, S> {
         update(self.simd, &mut time, [&elapsed], |time, [elapsed]| {
             time + elapsed
         });
-        inputs[state.len() + data.input.len()] = time;
+        inputs[layout.time()] = time;
+        if !layout.internal().is_empty() {
+            inputs[layout.starts()].copy_from_slice(&begun[layout.internal()]);
+            inputs[layout.step()] = self.part_of_substep(block, at.step, 1.0);
+        }
     }
 
     /// `part` times the length of a substep, s.
@@ -77,8 +82,13 @@ impl<S: Simd> Rollout<'_, S> {
         self.problem.structure.has_residual && at.substep == 0 && at.stage == 0
     }
 
-    /// Number of states, `2n`.
+    /// Number of states.
     pub(super) fn states(&self) -> usize {
+        self.problem.structure.states()
+    }
+
+    /// Number of positions and velocities.
+    pub(super) fn of_motion(&self) -> usize {
         2 * self.problem.structure.joints
     }
 }

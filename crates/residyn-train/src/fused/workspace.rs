@@ -28,6 +28,8 @@ pub(super) struct Scratch {
     pub mean: Vec<Rows>,
     /// The derivative by the states of the current stage.
     pub by_stage: Vec<Rows>,
+    /// The state at the start of the substep.
+    pub begun: Vec<Rows>,
 }
 
 impl Workspace {
@@ -38,9 +40,10 @@ impl Workspace {
             rates,
             mean,
             by_stage,
+            begun,
         } = &mut self.scratch;
-        for part in [state, rates, mean, by_stage] {
-            part.resize(CHUNK * 2 * structure.joints, Rows::splat(0.0));
+        for part in [state, rates, mean, by_stage, begun] {
+            part.resize(CHUNK * structure.states(), Rows::splat(0.0));
         }
         self.by_features.resize(networks.len(), Vec::new());
         for (by, network) in self.by_features.iter_mut().zip(networks) {

@@ -6,6 +6,11 @@ pub enum HybridError {
     #[error(transparent)]
     Network(#[from] NetworkError),
     #[error(
+        "the model of `{system}` has a motor behind a transmission, which would not know of an acceleration that a \
+         residual network adds to its link; train the equations alone"
+    )]
+    Transmission { system: String },
+    #[error(
         "parameter `{name}` has value {value}, scale {scale}, bounds {bounds:?}: training needs a \
          finite value, a finite scale above zero and the value within the bounds"
     )]

@@ -80,9 +80,15 @@ impl HybridModel {
     /// The same model with this residual F_r in place of any existing one.
     ///
     /// # Errors
-    /// A network that is not for the model's number of joints.
+    /// A network that is not for the model's number of joints, or equations with a transmission.
     pub fn with_residual(self, weights: &MlpWeights) -> Result<Self, HybridError> {
         weights.check(self.joints())?;
+        let equations = self.structure.equations.as_ref();
+        if equations.is_some_and(Dynamics::has_transmission) {
+            return Err(HybridError::Transmission {
+                system: self.system().to_owned(),
+            });
+        }
         Ok(Self {
             residual: Some(Mlp::new(weights, RESIDUAL_IDS, &self.device())),
             structure: Arc::new(self.structure.with_residual(weights)),

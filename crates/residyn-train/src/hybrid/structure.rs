@@ -8,16 +8,20 @@ pub(crate) struct Structure {
     /// Name of the system.
     pub system: String,
     pub joints: usize,
+    /// Places of the inputs of `program`.
+    pub layout: InputLayout,
     /// The prior as declared, if it is equations.
     pub equations: Option<Dynamics>,
     /// The networks whose outputs are added to the last rates: the prior, if it is one, and the residual.
     pub networks: Vec<MlpWeights>,
     /// Whether the last network is a residual.
     pub has_residual: bool,
-    /// Inputs as in [`Dynamics`]. Outputs: `2n` rates without the networks, then the scaled features of each network.
+    /// Inputs as in [`Dynamics`]. Outputs: the rates of all states without the networks, then the scaled features of each
+    /// network.
     pub program: Program,
     /// The reverse derivative of `program`. Inputs: those of `program`, with the derivatives of a quantity by each output
-    /// before the parameters. Outputs: its derivatives by the `2n` states, then by each parameter that is not fixed.
+    /// before the parameters. Outputs: its derivatives by the states, by the internal ones at the start of the substep, then by
+    /// each parameter that is not fixed.
     pub adjoint: Program,
     /// `adjoint` with respect to the parameters alone.
     pub parameter_adjoint: Program,
@@ -50,6 +54,11 @@ impl Structure {
         equations.map_or(&[], |dynamics| &dynamics.parameters)
     }
 
+    /// Number of states: positions, velocities, then internal states.
+    pub(crate) fn states(&self) -> usize {
+        self.layout.states().len()
+    }
+
     fn new(
         system: String,
         joints: usize,
@@ -57,20 +66,22 @@ impl Structure {
         networks: Vec<MlpWeights>,
         has_residual: bool,
     ) -> Self {
-        let parameters = equations.as_ref().map_or(&[][..], |d| &d.parameters);
-        let mut builder = Builder::new(joints, parameters);
-        let mut outputs = match &equations {
-            Some(dynamics) => builder.append(&dynamics.program),
-            None => builder.append(&nothing_but(&system, joints, networks[0].on).program),
+        let around = match &equations {
+            Some(dynamics) => dynamics.clone(),
+            None => nothing_but(&system, joints, networks[0].on),
         };
+        let layout = around.layout();
+        let mut builder = Builder::new(&around.program, layout);
+        let mut outputs = builder.append(&around.program);
         for network in &networks {
             outputs.extend(builder.features(network));
         }
         let program = builder.graph.finish(&outputs);
-        let (adjoint, parameter_adjoint) = adjoints(&program, joints, parameters);
+        let (adjoint, parameter_adjoint) = adjoints(&program, layout, &around.parameters);
         Self {
             system,
             joints,
+            layout,
             equations,
             networks,
             has_residual,
@@ -84,23 +95,19 @@ impl Structure {
 /// The program under construction.
 struct Builder {
     graph: Graph,
-    joints: usize,
+    layout: InputLayout,
     inputs: Vec<Node>,
 }
 
 impl Builder {
-    fn new(joints: usize, parameters: &[Parameter]) -> Self {
+    /// With the inputs of the equations.
+    fn new(equations: &Program, layout: InputLayout) -> Self {
         let mut graph = Graph::new();
-        let mut inputs = Vec::new();
-        for stem in ["q", "qd", "tau"] {
-            inputs.extend((1..=joints).map(|j| graph.input(&format!("{stem}{j}"))));
-        }
-        inputs.push(graph.input("t"));
-        inputs.extend(parameters.iter().map(|p| graph.input(&p.name)));
+        let names = equations.inputs().iter();
         Self {
+            inputs: names.map(|name| graph.input(name)).collect(),
             graph,
-            joints,
-            inputs,
+            layout,
         }
     }
 
@@ -109,29 +116,33 @@ impl Builder {
     }
 
     fn features(&mut self, network: &MlpWeights) -> Vec<Node> {
-        let layout = InputLayout::of(self.joints);
+        let layout = self.layout;
         let [q, qd, tau] = [layout.positions(), layout.velocities(), layout.driving()]
             .map(|places| &self.inputs[places]);
         network.features(&mut self.graph, q, qd, tau)
     }
 }
 
-/// The derivatives of a program by states and free parameters, and by the latter alone.
-fn adjoints(program: &Program, joints: usize, parameters: &[Parameter]) -> (Program, Program) {
+/// The derivatives of a program by states, by internal states at the start of the substep, and by free parameters; and by the
+/// latter alone.
+fn adjoints(
+    program: &Program,
+    layout: InputLayout,
+    parameters: &[Parameter],
+) -> (Program, Program) {
     let mut graph = Graph::new();
-    let (of_point, of_parameters) = program
-        .inputs()
-        .split_at(InputLayout::of(joints).parameters());
+    let (of_point, of_parameters) = program.inputs().split_at(layout.parameters());
     let mut inputs: Vec<Node> = of_point.iter().map(|name| graph.input(name)).collect();
     let seeds: Vec<Node> = (0..program.output_count())
         .map(|k| graph.input(&format!("by output {k}")))
         .collect();
     inputs.extend(of_parameters.iter().map(|name| graph.input(name)));
     let outputs = graph.append(program, &inputs);
-    let mut by = inputs[..2 * joints].to_vec();
+    let mut by = [&inputs[layout.states()], &inputs[layout.starts()]].concat();
+    let of_states = by.len();
     let free = inputs[of_point.len()..].iter().zip(parameters);
     by.extend(free.filter(|(_, p)| !p.fixed).map(|(node, _)| *node));
     let slopes = graph.gradient(&outputs, &seeds, &by);
-    let by_parameters = graph.clone().finish(&slopes[2 * joints..]);
+    let by_parameters = graph.clone().finish(&slopes[of_states..]);
     (graph.finish(&slopes), by_parameters)
 }

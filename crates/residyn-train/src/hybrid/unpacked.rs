@@ -7,7 +7,7 @@ use residyn_core::model::ResidualOn;
 /// ds/dt at a batch of points.
 #[derive(Debug, Clone)]
 pub struct Derivative {
-    /// dq/dt then dqd/dt: `2n` columns of shape `[batch]`, or `[1]` if all rows agree.
+    /// dq/dt, dqd/dt, then the rates of internal states: columns of shape `[batch]`, or `[1]` if all rows agree.
     pub rates: Vec<Tensor<1>>,
     /// F_r, `[batch, n or 2n]`; none in a model without a residual.
     pub residual: Option<Tensor<2>>,
@@ -29,20 +29,23 @@ impl<'m> Unpacked<'m> {
         }
     }
 
-    /// ds/dt for columns of shape `[batch]`: `2n` states, `n` inputs held, time in seconds.
+    /// ds/dt for columns of shape `[batch]`: states, `n` inputs held, time in seconds. The rates of internal states are means
+    /// over a step that begins in a state and has a length in seconds, `begun`.
     pub fn derivative(
         &self,
         state: &[Tensor<1>],
         input: &[Tensor<1>],
         time: &Tensor<1>,
+        begun: [&[Tensor<1>]; 2],
     ) -> Derivative {
-        let mut rates = self.prior(state, input, time);
-        let (q, qd) = state.split_at(self.model.joints());
+        let mut rates = self.prior(state, input, time, begun);
+        let joints = self.model.joints();
+        let (q, qd) = state[..2 * joints].split_at(joints);
         let residual = self.model.residual.as_ref();
         let residual = residual.map(|mlp| mlp.forward(q, qd, input));
         if let Some(residual) = residual.clone() {
             let parts = columns(residual);
-            let first = rates.len() - parts.len();
+            let first = 2 * joints - parts.len();
             for (rate, part) in rates[first..].iter_mut().zip(parts) {
                 *rate = rate.clone() + part;
             }
@@ -51,12 +54,23 @@ impl<'m> Unpacked<'m> {
     }
 
     /// The rates without the residual.
-    fn prior(&self, state: &[Tensor<1>], input: &[Tensor<1>], time: &Tensor<1>) -> Vec<Tensor<1>> {
+    fn prior(
+        &self,
+        state: &[Tensor<1>],
+        input: &[Tensor<1>],
+        time: &Tensor<1>,
+        [start, length]: [&[Tensor<1>]; 2],
+    ) -> Vec<Tensor<1>> {
         match (&self.model.structure().equations, &self.model.prior) {
             (Some(equations), _) => {
                 let mut inputs = state.to_vec();
                 inputs.extend_from_slice(input);
                 inputs.push(time.clone());
+                let internal = equations.layout().internal();
+                if !internal.is_empty() {
+                    inputs.extend_from_slice(&start[internal]);
+                    inputs.extend_from_slice(length);
+                }
                 inputs.extend_from_slice(&self.parameters);
                 replay(&equations.program, &inputs)
             }

@@ -1,5 +1,6 @@
 use serde_json::{Value, json};
 
+use super::data::Data;
 use super::{Kind, Recipe, RecipeError, TrainingData};
 use crate::{Backend, Checkpoint, HybridModel, Training};
 use residyn_core::model::{Dynamics, LastLayer, Library, MlpSettings, MlpWeights, Model, Origin};
@@ -129,7 +130,11 @@ fn identity(config: &Value, seed: u64, model_toml: &str) -> Identity {
 pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<(Model, String), RecipeError> {
     let path = beside_or_named(&recipe.path, &recipe.model);
     let model = read_model(&path, library)?;
-    model.stands_alone("a trained model")?;
+    match &recipe.data {
+        Data::Logged(_) => model.runs_without_logs("a trained model")?,
+        // Its trajectories begin anywhere, and what the states of effects are there is not known.
+        Data::Simulated(_) => model.stands_alone("a model trained on a simulated plant")?,
+    }
     let text = text_or_embedded(&path, Library::system_text)
         .map_err(|source| RecipeError::Open { path, source })?;
     Ok((model, text.into_owned()))

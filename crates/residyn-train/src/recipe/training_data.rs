@@ -5,7 +5,7 @@ use super::{Kind, Recipe, RecipeError};
 use crate::{Segments, SegmentsError};
 use residyn_core::data::{Log, Thinning, Trajectory, trajectories};
 use residyn_core::model::{Library, Model};
-use residyn_core::sim::as_modelled;
+use residyn_core::sim::motions;
 use residyn_core::streams::{Purpose, stream};
 use residyn_io::files::{beside, beside_or_named};
 use residyn_io::read_log;
@@ -48,15 +48,19 @@ fn from_logs(recipe: &Recipe, logged: &Logged, model: &Model) -> Result<Training
         length_s: f64::INFINITY,
     };
     let dynamics = model.dynamics();
-    let modelled = |log: &Log| match recipe.kind {
+    let motions = |log: &Log| match recipe.kind {
         // A network alone has no effects: it learns from the commanded torques and the sensor readings.
-        Kind::DataDriven => log.clone(),
-        Kind::Hybrid | Kind::Physics => as_modelled(&dynamics, log),
+        Kind::DataDriven => trajectories(log, &[], thinning),
+        Kind::Hybrid | Kind::Physics => motions(&dynamics, log, thinning),
     };
-    let mut training = Segments::new(model.joints, logged.steps);
+    let internal = match recipe.kind {
+        Kind::DataDriven => 0,
+        Kind::Hybrid | Kind::Physics => dynamics.layout().internal().len(),
+    };
+    let mut training = Segments::new(model.joints, logged.steps).with_internal(internal);
     for log in &logs {
         let before = training.len();
-        for trajectory in trajectories(&modelled(log), thinning) {
+        for trajectory in motions(log) {
             // A trajectory between gaps may be too short for a segment; a log without any segment is refused below.
             if trajectory.time.len() > logged.steps {
                 push(&mut training, &trajectory).map_err(in_file(&log.path))?;

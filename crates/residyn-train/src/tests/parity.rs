@@ -29,7 +29,9 @@ fn derivative<const N: usize>(model: &HybridModel, rows: &[[f32; N]]) -> Vec<f64
     };
     let columns: Vec<Tensor<1>> = (0..N).map(column).collect();
     let (state, input) = columns[..N - 1].split_at(states);
-    let derivative = model.unpack().derivative(state, input, &columns[N - 1]);
+    let derivative = model
+        .unpack()
+        .derivative(state, input, &columns[N - 1], [state, &[]]);
     let residual = model.structure().networks.last();
     if let (Some(found), Some(made)) = (derivative.residual, residual) {
         assert_eq!(found.dims(), [rows.len(), made.on.outputs(model.joints())]);

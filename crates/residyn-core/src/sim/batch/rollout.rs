@@ -8,9 +8,10 @@ use crate::sim::Integrator;
 /// Model, objective and integrator, compiled for rollouts from one state under many input sequences.
 #[derive(Debug, Clone)]
 pub struct Rollouts {
-    joints: usize,
-    /// Inputs: `q`, `qd`, `tau` and `t`, then the torque that led to this state, then the parameters. Outputs: ds/dt
-    /// by the equations (2n), the reward, then the scaled features of each network.
+    /// Places of the equations' inputs.
+    layout: InputLayout,
+    /// Inputs: those of the equations without the parameters, the torque that led to this state, then the parameters.
+    /// Outputs: ds/dt by the equations, the reward, then the scaled features of each network.
     program: Program,
     parameters: Vec<f32>,
     networks: Vec<Added>,
@@ -20,7 +21,7 @@ pub struct Rollouts {
     step_s: f32,
 }
 
-/// A network whose outputs are added to the last components of ds/dt.
+/// A network whose outputs are added to the last components of the motion's ds/dt.
 #[derive(Debug, Clone)]
 pub struct Added {
     network: Network,
@@ -34,7 +35,8 @@ pub struct Block<'r> {
     rollouts: &'r Rollouts,
     arch: Arch,
     tape: Tape<f32, W>,
-    /// State at the start of the step, and the state accumulated so far for its end: positions, then velocities.
+    /// State at the start of the step, and the state accumulated so far for its end: positions, velocities, then internal
+    /// states.
     state: Vec<Rows>,
     next: Vec<Rows>,
     rates: Vec<Rows>,
@@ -65,10 +67,10 @@ impl Rollouts {
             checked.expect("networks of this system");
         }
         Self {
-            joints: equations.joints,
+            layout: equations.layout(),
             program: whole(equations, networks, objective),
             parameters: equations.values().iter().map(|x| *x as f32).collect(),
-            networks: added(equations.joints, networks),
+            networks: added(equations.layout(), networks),
             memory: Memory::new(equations, step_s),
             integrator,
             step_s: step_s as f32,
@@ -77,7 +79,7 @@ impl Rollouts {
 
     /// Number of joints n.
     pub fn joints(&self) -> usize {
-        self.joints
+        self.layout.driving().len()
     }
 
     /// Number of steps before a plan whose torques still act in it: none without filters.
@@ -95,9 +97,9 @@ impl Rollouts {
 
     /// Working memory for one block.
     pub fn block(&self) -> Block<'_> {
-        let first = 4 * self.joints + 1;
+        let first = self.layout.parameters() + self.joints();
         let rows = |count: usize| vec![Rows::splat(0.0); count];
-        let states = || rows(2 * self.joints);
+        let states = || rows(self.layout.states().len());
         let values = |added: &Added| {
             let network = &added.network;
             [rows(network.features()), rows(network.activations())]
@@ -115,14 +117,14 @@ impl Rollouts {
     }
 }
 
-pub fn added(joints: usize, networks: &[MlpWeights]) -> Vec<Added> {
-    let mut first_feature = 2 * joints + 1;
+pub fn added(layout: InputLayout, networks: &[MlpWeights]) -> Vec<Added> {
+    let mut first_feature = layout.states().len() + 1;
     let mut add = |weights: &MlpWeights| {
         let network = Network::new(&weights.widths(), &to_f32(&weights.flat()));
         let first = first_feature;
         first_feature += network.features();
         Added {
-            first_rate: 2 * joints - network.outputs().len(),
+            first_rate: layout.internal().start - network.outputs().len(),
             first_feature: first,
             network,
         }
@@ -142,19 +144,19 @@ fn whole(equations: &Dynamics, networks: &[MlpWeights], objective: &Program) -> 
     let (until_now, parameters) = (write(&until_now), write(parameters));
     let inputs = [moving.as_slice(), &parameters].concat();
     let mut outputs = graph.append(&equations.program, &inputs);
-    let (states, time) = (&moving[layout.states()], &moving[layout.time()..]);
-    let reward = graph.append(objective, &[states, &until_now, time].concat());
+    let (motion, time) = (&moving[..layout.internal().start], moving[layout.time()]);
+    let reward = graph.append(objective, &[motion, &until_now, &[time]].concat());
     assert_eq!(reward.len(), 1, "an objective is one number");
     outputs.extend(reward);
     for network in networks {
-        let (q, qd) = states.split_at(n);
+        let (q, qd) = motion.split_at(n);
         outputs.extend(network.features(&mut graph, q, qd, &moving[layout.driving()]));
     }
     graph.finish(&outputs)
 }
 
 impl Block<'_> {
-    /// The sum of rewards of each rollout from `start` (positions, then velocities) at `time_s` under `inputs`
+    /// The sum of rewards of each rollout from `start` (positions, velocities, then internal states) at `time_s` under `inputs`
     /// (`[step * n + joint]`), each held for a step; `carried` is what earlier torques add to the acting ones, see
     /// [`Rollouts::carried`]. NaN or infinite if a rollout diverges.
     ///
@@ -168,8 +170,9 @@ impl Block<'_> {
         inputs: &[Rows],
         returns: &mut Rows,
     ) {
-        let n = self.rollouts.joints;
-        assert_eq!(start.len(), 2 * n, "one value for each state");
+        let n = self.rollouts.joints();
+        let states = self.rollouts.layout.states().len();
+        assert_eq!(start.len(), states, "one value for each state");
         let is_whole = inputs.len().is_multiple_of(n);
         assert!(!inputs.is_empty() && is_whole, "whole steps");
         let mut filtered = std::mem::take(&mut self.acting);
@@ -208,12 +211,15 @@ impl WithSimd for Run<'_, '_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let (block, inputs, returns) = (self.block, self.inputs, self.returns);
-        let (n, integrator) = (block.rollouts.joints, block.rollouts.integrator);
-        let layout = InputLayout::of(n);
+        let (layout, integrator) = (block.rollouts.layout, block.rollouts.integrator);
+        let n = layout.driving().len();
         let (stages, substeps) = (integrator.scheme().stages, integrator.substeps());
         let (steps, h) = (inputs.len() / n, block.rollouts.step_s / substeps as f32);
         for (row, value) in block.next.iter_mut().zip(self.start) {
             *row = Rows::splat(*value);
+        }
+        if !layout.internal().is_empty() {
+            block.tape.moving()[layout.step()] = Rows::splat(h);
         }
         *returns = Rows::splat(0.0);
         for step in 0..=steps {
@@ -227,7 +233,7 @@ impl WithSimd for Run<'_, '_> {
                     block.tape.moving()[layout.time()] = Rows::splat(begin_s + time);
                     block.tape.run_on(simd);
                     if k == 0 && substep == 0 && step > 0 {
-                        add(simd, returns, block.tape.output(2 * n), 1.0);
+                        add(simd, returns, block.tape.output(layout.states().len()), 1.0);
                         if step == steps {
                             return;
                         }
@@ -245,8 +251,7 @@ impl Block<'_> {
     /// Set the torque that acts over `step`, and for the reward the commanded torque of the step before.
     #[inline(always)]
     fn hold(&mut self, inputs: &[Rows], acting: &[Rows], step: usize) {
-        let n = self.rollouts.joints;
-        let layout = InputLayout::of(n);
+        let (layout, n) = (self.rollouts.layout, self.rollouts.joints());
         let slots = self.tape.moving();
         if let Some(now) = acting[step * n..].get(..n) {
             slots[layout.driving()].copy_from_slice(now);
@@ -260,7 +265,12 @@ impl Block<'_> {
     #[inline(always)]
     fn begin(&mut self) {
         self.state.copy_from_slice(&self.next);
-        self.tape.moving()[..self.next.len()].copy_from_slice(&self.next);
+        let layout = self.rollouts.layout;
+        let slots = self.tape.moving();
+        slots[layout.states()].copy_from_slice(&self.next);
+        if !layout.internal().is_empty() {
+            slots[layout.starts()].copy_from_slice(&self.next[layout.internal()]);
+        }
     }
 
     /// ds/dt at the tape's inputs: equations plus networks.
@@ -297,7 +307,7 @@ impl Block<'_> {
     #[inline(always)]
     fn finish<S: Simd>(&mut self, simd: S, h: f32) {
         if self.rollouts.integrator.scheme().semi_implicit {
-            let (positions, _) = self.next.split_at_mut(self.rollouts.joints);
+            let (positions, _) = self.next.split_at_mut(self.rollouts.joints());
             let accelerations = &self.rates[positions.len()..];
             for (position, acceleration) in positions.iter_mut().zip(accelerations) {
                 add(simd, position, acceleration, h * h);

@@ -83,7 +83,7 @@ fn exact(
     for (step, tau) in inputs.iter().enumerate() {
         let time_s = begin_s + STEP_S * step as f64;
         rig.step(&mut state, tau, time_s);
-        sum += objective.value(&state, tau, time_s + STEP_S);
+        sum += objective.value(&state[..2 * model.joints], tau, time_s + STEP_S);
     }
     sum
 }
@@ -104,26 +104,43 @@ fn both(equations: &Dynamics, networks: &[MlpWeights], integrator: Integrator) -
     let inputs: Vec<Rows> = (0..STEPS * n)
         .map(|_| Row::from_fn(|_| rng.random_range(-3.0..3.0)))
         .collect();
-    let found = returns(&rollouts, &start(n), 1.5, &[], &inputs);
+    let internal = equations.internal_starts(&equations.values());
+    let start = [start(n), internal].concat();
+    let found = returns(&rollouts, &start, 1.5, &[], &inputs);
     let whole = networks.iter().fold(equations.clone(), |sum, mlp| {
         with_residual(&sum, mlp).unwrap()
     });
     let exact = |lane: usize| {
         let of_step = |step: &[Rows]| step.iter().map(|row| f64::from(row[lane])).collect();
         let inputs: Vec<Vec<f64>> = inputs.chunks(n).map(of_step).collect();
-        exact(
-            (&whole, integrator),
-            &objective,
-            &start(n),
-            1.5,
-            &[],
-            &inputs,
-        )
+        exact((&whole, integrator), &objective, &start, 1.5, &[], &inputs)
     };
     [
         found.iter().copied().map(f64::from).collect(),
         (0..W).map(exact).collect(),
     ]
+}
+
+#[test]
+fn a_block_moves_the_states_of_effects() {
+    let library = Library::built_in();
+    let on = |name: &str, values: &[f64]| {
+        let mut own = FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0));
+        own.values = values.iter().map(|value| (*value, None)).collect();
+        own
+    };
+    let effects = vec![
+        on("joint_elasticity", &[60.0, 0.2, 0.02, 0.0, 1.0]),
+        on("presliding", &[0.12, 5.0]),
+    ];
+    let system = library.model("pendulum").unwrap().with_effects(effects);
+    for integrator in Integrator::each() {
+        let [found, exact] = both(&system.dynamics(), &[], integrator);
+        for (found, exact) in found.iter().zip(&exact) {
+            let off = (found - exact).abs();
+            assert!(off < 1e-3 * exact.abs().max(1.0), "{found} {exact}");
+        }
+    }
 }
 
 #[test]
