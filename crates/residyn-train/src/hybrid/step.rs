@@ -1,3 +1,5 @@
+use std::slice::from_ref;
+
 use burn::tensor::Tensor;
 
 use super::{Derivative, Unpacked};
@@ -27,12 +29,12 @@ impl Unpacked<'_> {
             1 => dt.clone(),
             substeps => dt.clone() / substeps as f64,
         };
-        let first = self.derivative(state, input, time, [state, &[h.clone()]]);
+        let first = self.derivative(state, input, time, [state, from_ref(&h)]);
         let residual = first.residual.clone();
         let mut state = self.substep(integrator.scheme(), state, input, time, &h, first);
         for k in 1..integrator.substeps() {
             let time = time.clone() + h.clone() * k as f64;
-            let start = self.derivative(&state, input, &time, [&state, &[h.clone()]]);
+            let start = self.derivative(&state, input, &time, [&state, from_ref(&h)]);
             state = self.substep(integrator.scheme(), &state, input, &time, &h, start);
         }
         StepResult { state, residual }
@@ -58,7 +60,7 @@ impl Unpacked<'_> {
                 let after = h.clone() * stage.time;
                 let inner = along(state, &rates, &after);
                 let time = time.clone() + after;
-                let taken = self.derivative(&inner, input, &time, [state, &[h.clone()]]);
+                let taken = self.derivative(&inner, input, &time, [state, from_ref(h)]);
                 rates = taken.rates;
             }
             let weighted = rates.iter().map(|rate| rate.clone() * stage.weight);
