@@ -1,3 +1,4 @@
+mod play;
 mod transmission;
 #[cfg(test)]
 pub(crate) use transmission::tests::{elastic, loose, viscous};
