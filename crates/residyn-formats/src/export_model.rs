@@ -202,6 +202,14 @@ impl ExportModel {
         self.effects.iter().flat_map(each)
     }
 
+    /// What the states of effects are, in their order: `z1 of presliding`.
+    pub(super) fn internal_labels(&self) -> impl Iterator<Item = String> {
+        let label = |(effect, state): (&ExportedEffect, &ExportedState)| {
+            format!("{} of {}", state.name, effect.name)
+        };
+        self.internal().map(label)
+    }
+
     /// The state at rest, before anything has moved.
     pub(super) fn rest(&self) -> Vec<f64> {
         let internal = self.internal().map(|(_, state)| state.start);

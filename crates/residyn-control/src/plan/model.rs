@@ -1,8 +1,8 @@
 use super::Evaluate;
 use residyn_core::sim::batch::{Block, Rows};
 
-/// Initial condition of a plan: state (positions, velocities, then internal states), time, and what the torques commanded before still
-/// do.
+/// Initial condition of a plan: state (positions, velocities, then internal states), time, and what the torques commanded
+/// before still do.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     state: Vec<f32>,

@@ -4,30 +4,27 @@ use super::{Names, networks};
 use crate::ExportModel;
 use residyn_core::expr::{Graph, Node, Program};
 
-/// The functions of the derivative and its Jacobian.
+/// The functions of the derivative and its Jacobian. If effects have states, these are those of the mean rates over a step, for
+/// one of no length.
 pub(super) fn derivative(model: &ExportModel, names: &Names) -> String {
     let program = &model.equations.program;
     let rates: Vec<String> = (0..model.states()).map(|k| format!("rates[{k}]")).collect();
-    let (template, starts) = match &model.equations.internal {
-        None => (include_str!("derivative.h"), String::new()),
-        Some(internal) => {
-            let first = model.equations.layout().internal().start;
-            let places = (0..internal.names.len()).map(|k| format!("state[{}]", first + k));
-            let places: Vec<String> = places.collect();
-            let starts = assignments(&internal.starts, &places, names);
-            (include_str!("mean_rates.h"), starts)
-        }
+    let rates = assignments(program, &rates, names) + &networks::added(model);
+    let jacobian = jacobian(model, names) + &networks::jacobian_added(model);
+    let written = |template: &str, rates: &str, jacobian: &str| {
+        let template = template.replace("RATES\n", rates);
+        template.replace("JACOBIAN\n", jacobian)
     };
-    template
-        .replace("STARTS\n", &starts)
-        .replace(
-            "RATES\n",
-            &(assignments(program, &rates, names) + &networks::added(model)),
-        )
-        .replace(
-            "JACOBIAN\n",
-            &(jacobian(model, names) + &networks::jacobian_added(model)),
-        )
+    let at_a_moment = include_str!("derivative.h");
+    let Some(internal) = &model.equations.internal else {
+        return written(at_a_moment, &rates, &jacobian);
+    };
+    let places = model.equations.layout().internal();
+    let places: Vec<String> = places.map(|k| format!("state[{k}]")).collect();
+    let starts = assignments(&internal.starts, &places, names);
+    let means = include_str!("mean_rates.h").replace("STARTS\n", &starts);
+    let [moment, of_moment] = [include_str!("moment.h"), include_str!("moment_jacobian.h")];
+    written(&means, &rates, &jacobian) + &written(at_a_moment, moment, of_moment)
 }
 
 /// The function for the inverse dynamics; empty with a network or without a torque balance.

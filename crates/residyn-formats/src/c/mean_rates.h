@@ -30,29 +30,3 @@ static inline void model_mean_rates_jacobian(const model_parameters *parameters,
     (void)parameters, (void)begun, (void)length, (void)state, (void)torque, (void)time;
 JACOBIAN
 }
-
-/* ds/dt under the torque that acts. */
-static inline void model_derivative(const model_parameters *parameters,
-        const model_real state[MODEL_STATES],
-        const model_real torque[MODEL_JOINTS], model_real time,
-        model_real rates[MODEL_STATES])
-{
-    model_mean_rates(parameters, state, 0, state, torque, time, rates);
-}
-
-/* Its derivatives by the state and by the torque: [rate][state], [rate][joint]. */
-static inline void model_derivative_jacobian(const model_parameters *parameters,
-        const model_real state[MODEL_STATES],
-        const model_real torque[MODEL_JOINTS],
-        model_real time,
-        model_real by_state[MODEL_STATES][MODEL_STATES],
-        model_real by_torque[MODEL_STATES][MODEL_JOINTS])
-{
-    model_real by_begun[MODEL_STATES][MODEL_INTERNAL];
-    int i, k;
-    model_mean_rates_jacobian(parameters, state, 0, state, torque, time, by_state, by_begun,
-        by_torque);
-    for (i = 0; i < MODEL_STATES; i++)
-        for (k = 0; k < MODEL_INTERNAL; k++)
-            by_state[i][2 * MODEL_JOINTS + k] += by_begun[i][k];
-}

@@ -170,9 +170,7 @@ fn comment(text: &str) -> String {
 fn sizes(model: &ExportModel) -> String {
     let (n, states) = (model.joints(), model.states());
     let parts = model.integrator.substeps();
-    let internal: Vec<String> = (model.internal())
-        .map(|(effect, state)| format!("{} of {}", state.name, effect.name))
-        .collect();
+    let internal: Vec<String> = model.internal_labels().collect();
     let (of_effects, defined) = match internal.len() {
         0 => (String::new(), String::new()),
         count => (

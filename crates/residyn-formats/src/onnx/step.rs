@@ -22,10 +22,10 @@ pub fn inputs(builder: &mut Builder, model: &ExportModel, torque: &str) -> Input
         .map(|joint| model.units(joint).join(", "))
         .collect();
     let about = format!("of joints in {}", units.join("; "));
-    let of_effects: Vec<String> = (model.internal())
-        .map(|(effect, state)| format!(", then {} of {}", state.name, effect.name))
-        .collect();
-    let of_effects = of_effects.concat();
+    let of_effects = model
+        .internal_labels()
+        .map(|label| format!(", then {label}"));
+    let of_effects: String = of_effects.collect();
     let state = builder.input(
         "state",
         model.states(),

@@ -105,8 +105,8 @@ fn head(model: &ExportModel) -> String {
         plain(model.name()),
         units.join(", "),
         driving = model.driving(),
-        of_effects = (model.internal())
-            .map(|(effect, state)| format!(", then {} of {}", state.name, effect.name))
+        of_effects = (model.internal_labels())
+            .map(|label| format!(", then {label}"))
             .collect::<String>(),
         s = if n == 1 { "" } else { "s" },
     )

@@ -1,0 +1,1 @@
+    model_mean_rates(parameters, state, 0, state, torque, time, rates);
