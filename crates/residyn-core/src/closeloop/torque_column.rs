@@ -19,7 +19,8 @@ impl Prepared<'_> {
     pub(super) fn with_known_torques(mut self) -> Self {
         let is_held = |log: &Log| log.torque == TorqueColumn::Held;
         let is_known = self.model.columns.torque.is_some() || !self.train.logs.iter().all(is_held);
-        if is_known || self.model.driven_by() != Quantity::Torque {
+        // What cannot be fitted is refused as soon as it would be.
+        if is_known || self.model.driven_by() != Quantity::Torque || self.check().is_err() {
             return self;
         }
         let column = self.problem(ErrorModel::OutputError).torque_column();
