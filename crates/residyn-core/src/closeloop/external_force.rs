@@ -6,6 +6,7 @@ use super::problem::Problem;
 use super::settings::NoteSettings;
 use crate::data::statistics::{SIGMA_PER_MAD, median};
 use crate::data::{Audit, Finding, Interval, Joint, Quantity, Severity};
+use crate::model::Model;
 
 /// One external force on one joint.
 #[derive(Debug)]
@@ -20,19 +21,24 @@ struct ExternalForce {
 }
 
 /// Report in the audits of the problem's logs where an external force acted, judged by the residual forces of a fitted
-/// model; returns what that means for the answer, as a sentence's part, if one acted.
+/// model; returns what that means for the answer, as a sentence's part, if one acted. Where the states of a model's effects
+/// were when a log began is not known: what they need there until they have settled is no push.
 pub(super) fn report_external_forces(
     problem: &Problem<'_>,
+    model: &Model,
     forces: &[ForceSample],
     audits: &mut [Audit],
 ) -> Option<String> {
     let mut found = Vec::new();
     let settings = &problem.settings.notes;
     let block_s = problem.settings.diagnostics.block_s;
+    let has_states = (model.effects.iter()).any(|effect| !effect.effect.states.is_empty());
     for joint in Joint::all(problem.declared.joints) {
         let unit = problem.declared.columns.unit(Quantity::Torque, joint);
         let least = settings.push_torque * problem.top_torque[joint];
-        for push in pushes(forces, joint, (block_s, least), settings) {
+        let mut pushes = pushes(forces, joint, (block_s, least), settings);
+        pushes.retain(|push| !has_states || !push.begins_a_log(forces));
+        for push in pushes {
             let log = problem.logs[push.log].name();
             found.push(format!("from {} in {log}", push.span()));
             audits[push.log].add(push.finding(&log, unit));
@@ -83,6 +89,12 @@ fn pushes(
 }
 
 impl ExternalForce {
+    fn begins_a_log(&self, samples: &[ForceSample]) -> bool {
+        let mut samples = samples.iter();
+        let first = samples.find(|sample| sample.log == self.log);
+        first.is_some_and(|first| self.span.start_s <= first.time_s)
+    }
+
     /// When it acted, to a hundredth of a second.
     fn span(&self) -> Interval {
         let rounded = |t: f64| (100.0 * t).round() / 100.0;
@@ -136,6 +148,9 @@ mod tests {
             (one[0].span.start_s - 5.925).abs() < 1e-9 && (one[0].span.end_s - 6.525).abs() < 1e-9
         );
         assert!(found(&pushed, 3.0).is_empty());
+        assert!(!one[0].begins_a_log(&samples(pushed)));
+        let released = |k: usize| usual(k) + if k < 4 { 2.0 } else { 0.0 };
+        assert!(found(&released, 0.1)[0].begins_a_log(&samples(released)));
         assert!(found(&|k| usual(k) + if k == 40 { 2.0 } else { 0.0 }, 0.1).is_empty());
     }
 }

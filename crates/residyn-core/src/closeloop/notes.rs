@@ -56,12 +56,14 @@ pub(super) fn noted(
     report_scaled_limbs(problem, &refined.after.model, &mut of_train);
     // Logs on which the model diverges cannot show external forces.
     let residual = diagnostics.after.as_ref().ok();
-    let pushed = residual
-        .and_then(|residual| report_external_forces(problem, &residual.samples, &mut of_train));
+    let model = &found.chosen.after.model;
+    let pushed = residual.and_then(|residual| {
+        report_external_forces(problem, model, &residual.samples, &mut of_train)
+    });
     let tested = problem.on(&prepared.test.for_fits);
     report_gravity(&shares_of_gravity(&tested), settings, &mut of_test);
     if let Ok(forces) = residual_force(&tested, &found.chosen.after) {
-        report_external_forces(&tested, &forces, &mut of_test);
+        report_external_forces(&tested, model, &forces, &mut of_test);
     }
     let mut audits = [of_train, of_test].concat();
     report_unmatched(problem.declared, prepared, &mut audits);
