@@ -61,7 +61,7 @@ fn a_model_of_more_parameters_than_can_be_fitted_is_refused() {
 fn a_log_in_which_one_joint_of_two_rests_gets_an_answer() {
     let scratch = Scratch::new();
     let mut log = "time,q1,q2,qd1,qd2,tau1,tau2\n".to_owned();
-    for row in 0..600 {
+    for row in 0..300 {
         let time = 0.01 * f64::from(row);
         let [q, qd, tau] = swinging(time);
         writeln!(log, "{time:?},{q:?},0,{qd:?},0,{tau:?},0").unwrap();
