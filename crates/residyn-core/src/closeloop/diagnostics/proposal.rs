@@ -109,12 +109,7 @@ fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -
         if !problem.shows(&effect) {
             return None;
         }
-        let start = best_start(
-            problem,
-            model,
-            &FittedEffect::absent(&effect, joint),
-            f64::INFINITY,
-        )?;
+        let start = best_start(problem, model, &FittedEffect::absent(&effect, joint))?;
         let cost = screened_cost(problem, model, &start)?;
         Some((terms, start, cost))
     };
