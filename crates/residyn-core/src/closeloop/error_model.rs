@@ -32,11 +32,7 @@ impl ErrorModel {
     /// compared.
     fn shows(self, effect: &Effect, declared: &Model) -> bool {
         match self {
-            // On several joints a search over transmissions outlasts its time.
-            Self::OutputError => {
-                effect.shows_in == ShowsIn::Any
-                    && (declared.joints == 1 || !effect.is_transmission())
-            }
+            Self::OutputError => effect.shows_in == ShowsIn::Any,
             Self::InverseDynamics => {
                 !matches!(effect.entry, Entry::Reading(_))
                     && !effect.is_transmission()

@@ -175,6 +175,9 @@ settings! {
         most_rounds: usize = 8,
         /// A round must lower the loss on left-out blocks by this share for another round to follow.
         round_gain: f64 = 0.02,
+        /// A transmission is fitted to all windows if fits to a sample of them lower its cost by this share: half of what a
+        /// round must bring, since a sample differs from the whole.
+        sampled_gain: f64 = 0.01,
         /// A round that lowers the loss on left-out blocks by this share is taken as it is. After a smaller gain,
         /// exchanges are tried before anything is added.
         large_gain: f64 = 0.5,

@@ -344,6 +344,11 @@ impl Effect {
         matches!(self.entry, Entry::Transmission(_))
     }
 
+    /// Whether the effect is a transmission that is free within a range, in which nothing passes.
+    pub fn has_play(&self) -> bool {
+        self.is_transmission() && self.states.iter().any(|state| state.within.is_some())
+    }
+
     /// Whether the effect couples its joint with the next one.
     pub fn is_coupling(&self) -> bool {
         matches!(self.entry, Entry::Coupling(_))

@@ -109,7 +109,12 @@ fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -
         if !problem.shows(&effect) {
             return None;
         }
-        let start = best_start(problem, model, &FittedEffect::absent(&effect, joint))?;
+        let start = best_start(
+            problem,
+            model,
+            &FittedEffect::absent(&effect, joint),
+            f64::INFINITY,
+        )?;
         let cost = screened_cost(problem, model, &start)?;
         Some((terms, start, cost))
     };

@@ -4,14 +4,12 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::equations::{Eliminated, not_at_bounds, solve_among, step_from_bounds};
-use super::trial::is_consistent;
+use super::on_sample::fitted_on_sample;
 use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::data::{Joint, Quantity, moves_as_one};
-use crate::identify::{
-    Fit, LevenbergMarquardt, Shooting, WindowTerms, as_it_stands, fit_by, predicted_cost,
-};
+use crate::identify::{Fit, Shooting, WindowTerms, as_it_stands, predicted_cost};
 use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect, Model};
 
 /// Every effect of the library on every joint where it can act and is not yet in the model, and every shift of a
@@ -98,31 +96,27 @@ pub fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
     points.into_iter().map(at).collect()
 }
 
-/// The starting point of a candidate with the largest predicted decrease of a model's cost, on a sample of the windows.
+/// The starting point of a candidate with the largest predicted decrease of a model's cost, on a sample of the windows. What
+/// no value switches off has several steps of a fit of its motion behind it, which lead below this cost of the sample.
 pub fn best_start(
     problem: &Problem<'_>,
     fitted: &Fitted,
     candidate: &FittedEffect,
+    below: f64,
 ) -> Option<FittedEffect> {
     let mut starts = starts(candidate);
     if starts.len() < 2 {
         return starts.pop();
     }
-    match has_switch(candidate) {
-        true => best_by_switches(problem, fitted, &[starts]).pop()?,
-        false => best_by_cost(problem, fitted, starts),
+    if has_switch(candidate) {
+        return best_by_switches(problem, fitted, &[starts]).pop()?;
     }
-}
-
-/// All starts are taken as far as this many steps of a fit, and the best few of them as far as some more.
-const FIRST_STEPS: LevenbergMarquardt = at_most(4);
-const MORE_STEPS: LevenbergMarquardt = at_most(10);
-const FEW: usize = 4;
-
-const fn at_most(most_steps: usize) -> LevenbergMarquardt {
-    LevenbergMarquardt {
-        most_steps,
-        ..LevenbergMarquardt::USUAL
+    match problem.error_model {
+        ErrorModel::InverseDynamics => best_by_cost(problem, fitted, starts),
+        ErrorModel::OutputError => {
+            let best = fitted_on_sample(problem, fitted, starts, below)?;
+            best.model.effects.last().cloned()
+        }
     }
 }
 
@@ -217,55 +211,18 @@ pub fn beside(problem: &Problem<'_>, fitted: &Fitted, candidate: &FittedEffect) 
     Some(beside)
 }
 
-/// The starting point with the lowest cost on the sample of windows: the one that a linearisation of each predicts if torques
-/// are compared, which nearly all effects enter linearly; for motion, that which some steps of a fit reach.
-fn best_by_cost(
+/// The starting point with the lowest cost on the sample of windows, as a linearisation of each predicts: nearly all effects
+/// enter torques linearly.
+pub fn best_by_cost(
     problem: &Problem<'_>,
     fitted: &Fitted,
     starts: Vec<FittedEffect>,
 ) -> Option<FittedEffect> {
-    if problem.error_model == ErrorModel::OutputError {
-        return best_by_fit(problem, fitted, starts);
-    }
     let predicted = |start| Some((screened_cost_on_sample(problem, fitted, &start)?, start));
     let predicted = starts.into_par_iter().filter_map(predicted);
     let predicted: Vec<(f64, FittedEffect)> = predicted.collect();
     let best = predicted.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(best.1)
-}
-
-/// The candidate where fits to the sample of windows lead to the lowest cost.
-fn best_by_fit(
-    problem: &Problem<'_>,
-    fitted: &Fitted,
-    starts: Vec<FittedEffect>,
-) -> Option<FittedEffect> {
-    let scale = Some(fitted.fit.scale);
-    let moved = |solver: &LevenbergMarquardt, model: &Model, states: Vec<Vec<f64>>| {
-        let shooting = &problem.sample.shooting;
-        let found = problem.fitted_by(model, |dynamics, active| {
-            fit_by(solver, shooting, dynamics, active, states, scale)
-        });
-        found.ok()
-    };
-    let begin = |start: FittedEffect| {
-        let model = fitted.model.with_effects(fitted.effects_and(&[start]));
-        let states = problem.sample.start_states(&fitted.fit.start_states);
-        moved(&FIRST_STEPS, &model, states)
-    };
-    let in_order = |mut all: Vec<Fitted>| {
-        all.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-        all
-    };
-    let mut begun = in_order(starts.into_par_iter().filter_map(begin).collect());
-    // Where nothing shows a difference, as that of the side of a friction that the model does not have.
-    begun.dedup_by(|a, b| a.fit.cost == b.fit.cost);
-    begun.truncate(FEW);
-    let begun = begun.into_par_iter();
-    let ended =
-        begun.filter_map(|Fitted { model, fit }| moved(&MORE_STEPS, &model, fit.start_states));
-    let mut ended = in_order(ended.collect()).into_iter();
-    ended.find_map(|mut best| best.model.effects.pop().filter(is_consistent))
 }
 
 /// As above, for candidates that are absent at every starting point: one linearisation compares all of them, since only

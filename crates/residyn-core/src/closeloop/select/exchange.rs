@@ -1,5 +1,6 @@
-use super::candidate::{acting, best_start, has_switch, numbered, screened_cost, starts};
+use super::candidate::{acting, best_start, has_switch, numbered, screened_cost_on_sample, starts};
 use super::identity::EffectId;
+use super::on_sample::cost_on_sample;
 use super::screening::Screening;
 use super::sets::lowest;
 use crate::closeloop::error_model::ErrorModel;
@@ -28,6 +29,9 @@ struct Swap {
 pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted, limit: f64) -> Vec<Exchange> {
     let declared = problem.declared.effects.len();
     let fitted = fitted.clone().without_windows();
+    let Some(below) = promising_on_sample(problem, &fitted) else {
+        return Vec::new();
+    };
     let mut sets = Vec::new();
     for Swap { place, new } in promising(problem, &fitted, swaps(problem, &fitted), limit) {
         let mut rest = fitted.clone();
@@ -35,10 +39,10 @@ pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted, limit: f64) -> V
         let is_itself = new.effect.name == old.effect.name;
         let mut starts = Vec::new();
         if !is_itself || has_switch(&new) {
-            starts.extend(in_place_of(problem, &rest, &old, &new));
+            starts.extend(in_place_of(problem, &rest, (&old, &new), below));
         }
         if is_itself {
-            starts.extend(with_numbers_beside(problem, &rest, &old));
+            starts.extend(with_numbers_beside(problem, &rest, &old, below));
         }
         sets.extend(starts.into_iter().map(|start| {
             let pair = [problem.id(&old), problem.id(&start)];
@@ -108,17 +112,25 @@ fn promising(problem: &Problem<'_>, fitted: &Fitted, swaps: Vec<Swap>, limit: f6
     promising.map(|(swap, _)| swap).collect()
 }
 
+/// The cost over the sample of windows that a set as good as a model's may leave there.
+fn promising_on_sample(problem: &Problem<'_>, fitted: &Fitted) -> Option<f64> {
+    let settings = &problem.settings.select;
+    let rise = settings.prediction_slack * settings.simpler_rise;
+    Some(cost_on_sample(problem, fitted)? * (1.0 + rise))
+}
+
 /// The effect that replaces another: at its best start or, if the prediction is better there, at the value of the old
 /// one. The replacement of a strong effect is far from absent.
 fn in_place_of(
     problem: &Problem<'_>,
     rest: &Fitted,
-    old: &FittedEffect,
-    new: &FittedEffect,
+    (old, new): (&FittedEffect, &FittedEffect),
+    below: f64,
 ) -> Option<FittedEffect> {
-    let absent = best_start(problem, rest, new)?;
+    let absent = best_start(problem, rest, new, below)?;
     let is_predicted_better = |carried: &FittedEffect| {
-        let [carried, absent] = [carried, &absent].map(|start| screened_cost(problem, rest, start));
+        let starts = [carried, &absent];
+        let [carried, absent] = starts.map(|start| screened_cost_on_sample(problem, rest, start));
         carried.is_some_and(|carried| absent.is_none_or(|absent| carried < absent))
     };
     let carried = carried_over(old, &absent).filter(is_predicted_better);
@@ -131,6 +143,7 @@ fn with_numbers_beside(
     problem: &Problem<'_>,
     rest: &Fitted,
     old: &FittedEffect,
+    below: f64,
 ) -> Vec<FittedEffect> {
     let mut starts = Vec::new();
     for (k, parameter) in old.effect.parameters.iter().enumerate() {
@@ -142,9 +155,9 @@ fn with_numbers_beside(
             [_] => parameter.bounds.iter().copied(),
             starts => starts.iter().copied(),
         };
-        let below = numbers().filter(|number| *number < own).reduce(f64::max);
-        let above = numbers().filter(|number| *number > own).reduce(f64::min);
-        for number in below.into_iter().chain(above) {
+        let less = numbers().filter(|number| *number < own).reduce(f64::max);
+        let more = numbers().filter(|number| *number > own).reduce(f64::min);
+        for number in less.into_iter().chain(more) {
             if !has_switch(old) {
                 let mut moved = old.clone();
                 moved.values[k].0 = number;
@@ -154,7 +167,7 @@ fn with_numbers_beside(
             let mut single = old.clone();
             single.effect.parameters[k].starts = vec![number];
             starts.extend(
-                best_start(problem, rest, &single).map(|start| FittedEffect {
+                best_start(problem, rest, &single, below).map(|start| FittedEffect {
                     effect: old.effect.clone(),
                     ..start
                 }),

@@ -9,6 +9,7 @@ mod folds;
 mod identity;
 mod knowledge;
 mod losses;
+mod on_sample;
 mod open_loop_check;
 mod rivals;
 mod scale;

@@ -1,13 +1,16 @@
-use super::candidate::{beside, best_start, has_switch};
+use super::candidate::{beside, best_by_cost, has_switch, starts};
+use super::on_sample::{cost_on_sample, fitted_on_sample};
 use super::screening::Screening;
 use super::sets::best_predicted;
+use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
+use crate::data::Joint;
 use crate::model::FittedEffect;
 
 /// The sets of effects with the largest predicted fall of a fitted model's loss, the best first, each beyond the
 /// declared effects. All candidates are linearised at once, and sets are compared without a fit. Effects that no value
-/// switches off cannot be compared this way and come last, each alone added to the effects of the model.
+/// switches off cannot be compared this way and come last, each alone added to the effects of the model, if it is worth a fit.
 pub fn screen(
     problem: &Problem<'_>,
     fitted: &Fitted,
@@ -18,22 +21,70 @@ pub fn screen(
         let predicted = best_predicted(&screening, problem);
         sets = predicted.iter().map(|set| screening.effects(set)).collect();
     }
-    let unswitched = candidates.iter().filter(|c| !has_switch(c));
-    sets.extend(each_alone(problem, fitted, unswitched));
+    if let Some(beside) = OneMore::beside(problem, fitted) {
+        let unswitched = candidates.iter().filter(|c| !has_switch(c)).map(starts);
+        sets.extend(unswitched.filter_map(|starts| beside.with(starts)));
+    }
     sets
 }
 
-/// The effects of a fitted model, beyond the declared ones, with each candidate alone at its best starting point.
-pub fn each_alone<'c>(
+/// The effects of a fitted model with one transmission more, of which these are the starts, if it is worth a fit. Play is a spring that
+/// is soft in its middle: where no spring helps, it is not tried.
+pub fn with_transmissions(
     problem: &Problem<'_>,
     fitted: &Fitted,
-    candidates: impl IntoIterator<Item = &'c FittedEffect>,
+    transmissions: Vec<Vec<FittedEffect>>,
 ) -> Vec<Vec<FittedEffect>> {
-    let declared = problem.declared.effects.len();
-    let alone = |candidate: &FittedEffect| {
-        let beside = beside(problem, fitted, candidate)?;
-        let start = best_start(problem, &beside, candidate)?;
-        Some([&beside.model.effects[declared..], &[start]].concat())
+    let Some(beside) = OneMore::beside(problem, fitted) else {
+        return Vec::new();
     };
-    candidates.into_iter().filter_map(alone).collect()
+    let has_play = |starts: &Vec<FittedEffect>| starts.iter().any(|start| start.effect.has_play());
+    let (plays, springs): (Vec<_>, Vec<_>) = transmissions.into_iter().partition(has_play);
+    let joint = |starts: &Vec<FittedEffect>| starts.first().map(|start| start.joint);
+    let springs = springs.into_iter();
+    let springs = springs.map(|spring| (joint(&spring), beside.with(spring)));
+    let springs: Vec<_> = springs.collect();
+    let is_stiff = |at: Option<Joint>| {
+        springs
+            .iter()
+            .any(|(joint, set)| *joint == at && set.is_none())
+    };
+    let plays = plays.into_iter().filter(|play| !is_stiff(joint(play)));
+    let plays: Vec<_> = plays.filter_map(|play| beside.with(play)).collect();
+    let springs = springs.into_iter().filter_map(|(_, set)| set);
+    springs.chain(plays).collect()
+}
+
+/// A fitted model that one effect more, which no value switches off, is added to.
+struct OneMore<'a, 'p> {
+    problem: &'a Problem<'p>,
+    fitted: &'a Fitted,
+    /// With it, the sample of windows has to cost less than this for a fit to all of them to be worth its time.
+    enough: f64,
+}
+
+impl<'a, 'p> OneMore<'a, 'p> {
+    fn beside(problem: &'a Problem<'p>, fitted: &'a Fitted) -> Option<Self> {
+        let cost = cost_on_sample(problem, fitted)?;
+        Some(Self {
+            problem,
+            fitted,
+            enough: cost * (1.0 - problem.of_whole(problem.settings.select.sampled_gain)),
+        })
+    }
+
+    /// The effects beyond the declared ones, with one more that has these starts; `None` if it is not worth a fit.
+    fn with(&self, starts: Vec<FittedEffect>) -> Option<Vec<FittedEffect>> {
+        let beside = beside(self.problem, self.fitted, starts.first()?)?;
+        let with = match self.problem.error_model {
+            ErrorModel::OutputError => {
+                fitted_on_sample(self.problem, &beside, starts, self.enough)?.model
+            }
+            ErrorModel::InverseDynamics => {
+                let best = best_by_cost(self.problem, &beside, starts)?;
+                beside.model.with_effects(beside.effects_and(&[best]))
+            }
+        };
+        Some(with.effects[self.problem.declared.effects.len()..].to_vec())
+    }
 }

@@ -4,12 +4,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::baseline::baseline_sets;
-use super::candidate::candidates;
+use super::candidate::{candidates, starts};
 use super::exchange::{Exchange, exchanges};
 use super::identity::EffectId;
 use super::open_loop_check::OpenLoopCheck;
 use super::scale::at_other_scales;
-use super::screen::{each_alone, screen};
+use super::screen::{screen, with_transmissions};
 use super::screening::Screening;
 use super::sets::descent;
 use super::simpler::{repaired, simpler};
@@ -48,8 +48,17 @@ struct Search<'a> {
     rounds: Vec<Round>,
     /// Exchanges that made the set worse since a round changed it: the old and the new effect.
     rejected: HashSet<[EffectId; 2]>,
+    helpful: Helpful,
     /// The current activity, as last reported.
     doing: String,
+}
+
+/// The transmissions that help.
+struct Helpful {
+    /// At the values that fits to the sample of windows led them to.
+    transmissions: Vec<FittedEffect>,
+    /// Loss of the model, in units of the sensors' noise, with which all were last tried from all of their starts.
+    loss: f64,
 }
 
 /// A set that is better than the one that its round began with, and its rank in the round.
@@ -102,6 +111,10 @@ impl<'a> Search<'a> {
             usual: None,
             rounds: Vec::new(),
             rejected: HashSet::new(),
+            helpful: Helpful {
+                transmissions: Vec::new(),
+                loss: f64::INFINITY,
+            },
             doing: Stage::Select.text().into(),
         }
     }
@@ -280,10 +293,34 @@ impl<'a> Search<'a> {
         let is_large = |trial: &Trial| self.is_large_gain(trial, from);
         if !transmissions.is_empty() && !fitted.iter().any(is_large) {
             self.say("fitting transmissions");
-            let sets = each_alone(problem, &from.fitted, &transmissions);
+            let sets = self.transmissions(from, transmissions);
             fitted.extend(self.fitted_for_the_best(from, sets));
         }
         self.noted(from, fitted, number)
+    }
+
+    /// The sets with one of these transmissions more that are worth a fit. Those that did not help are tried again, and the
+    /// others from all of their starts, once the loss has fallen far since.
+    fn transmissions(&mut self, from: &Trial, all: Vec<FittedEffect>) -> Vec<Vec<FittedEffect>> {
+        let problem = self.problem;
+        let loss = from.loss() * from.fitted.fit.scale.powi(2);
+        let has_fallen = loss < self.helpful.loss * (1.0 - problem.settings.select.large_gain);
+        if has_fallen {
+            self.helpful.loss = loss;
+        }
+        let led_to = |new: &FittedEffect| {
+            let mut helpful = self.helpful.transmissions.iter();
+            helpful.find(|led| led.joint == new.joint && led.effect.name == new.effect.name)
+        };
+        let starts = |new: &FittedEffect| match has_fallen {
+            true => Some(starts(new)),
+            false => led_to(new).map(|led| vec![led.clone()]),
+        };
+        let starts = all.iter().filter_map(starts).collect();
+        let sets = with_transmissions(problem, &from.fitted, starts);
+        let helpful = sets.iter().filter_map(|set| set.last().cloned());
+        self.helpful.transmissions = helpful.collect();
+        sets
     }
 
     fn is_large_gain(&self, trial: &Trial, from: &Trial) -> bool {
