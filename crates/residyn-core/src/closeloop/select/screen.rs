@@ -28,8 +28,8 @@ pub fn screen(
     sets
 }
 
-/// The effects of a fitted model with one transmission more, of which these are the starts, if it is worth a fit. Play is a spring that
-/// is soft in its middle: where no spring helps, it is not tried.
+/// The effects of a fitted model with one transmission more, of which these are the starts, if it is worth a fit. Play is a
+/// spring that is soft in its middle: where no spring helps, it is not tried.
 pub fn with_transmissions(
     problem: &Problem<'_>,
     fitted: &Fitted,
