@@ -79,6 +79,30 @@ fn warmth_changes_friction_and_nothing_else() {
     }
 }
 
+#[test]
+fn damped_bristles_hold_more_near_standstill() {
+    let model = drive(&[effect("lugre_friction", 0, &[0.4, 0.6, 0.1, 20.0, 0.3])]);
+    for (z, v) in [(0.0, 0.5), (0.01, 0.05), (-0.02, 0.1), (0.02, -2.0)] {
+        let level = 0.4 + 0.2 * f64::exp(-(v / 0.1_f64).powi(2));
+        let rate = v - v.abs() * 20.0 * z / level;
+        let (force, rates) = at(&model, 0.3, v, &[z]);
+        assert_near(force, -20.0 * z - 0.3 * rate, 1e-12, "force");
+        assert_near(rates[0], rate, 1e-12, "rate");
+    }
+}
+
+#[test]
+fn a_hot_winding_lets_less_current_through() {
+    let model = drive(&[effect("winding_heat", 0, &[0.5, 8.0])]);
+    for (tau, w) in [(0.0, 0.3), (2.0, 0.0), (-1.5, 0.6)] {
+        let inputs = [&[0.2, 0.7, w, tau, 0.0, w, 0.0], model.values().as_slice()].concat();
+        let out = model.program.eval(&inputs);
+        let left = 1.0 / (1.0 + 0.5 * w);
+        assert_near(out[1], tau * left, 1e-12, "acceleration");
+        assert_near(out[2], (tau * tau * left - w) / 8.0, 1e-12, "rate");
+    }
+}
+
 /// The mass is pushed to and fro by more and by less than the friction holds, in steps of a millisecond and, beside it, in
 /// steps of a microsecond.
 #[test]

@@ -11,7 +11,7 @@ import numpy as np
 rig, delay_s, *logs = sys.argv[1:]
 model = mujoco.MjModel.from_xml_path(rig)
 n = model.nv
-SAMPLE_S, DURATION_S, ENCODER, NOISE = 0.01, 15.0, 2 * np.pi / 16384, 1e-4
+SAMPLE_S, DURATION_S, ENCODER, NOISE = 0.01, 8.0, 2 * np.pi / 16384, 1e-4
 every = round(SAMPLE_S / model.opt.timestep)
 late = round(float(delay_s) / model.opt.timestep)
 

@@ -197,7 +197,7 @@ fn the_force_of_an_imposed_motion_is_explained() {
     assert!(
         names(&report)
             .iter()
-            .any(|name| name == "presliding" || name.ends_with("_friction")),
+            .any(|name| *name == "presliding" || name.ends_with("_friction")),
         "{effects:#?}"
     );
     let mass = &report["parameters"][0];

@@ -1,6 +1,7 @@
 //! Whole files of tests that `tests/run --quick` leaves out.
 
 mod clients;
+mod drivetrains;
 mod experiments;
 mod export_c;
 mod export_fmu;

@@ -94,13 +94,22 @@ sensor = 1
 friction = 0
 "#;
 
-/// Friction that gives on one joint, and that falls as it warms up on the other.
+/// A winding that heats up and friction that gives on one joint, friction that falls as it warms up on the other.
 const WARMING: &str = r#"
 [[effect]]
-name = "presliding"
+name = "winding_heat"
+joint = 1
+a = 0.2
+T = 3.0
+
+[[effect]]
+name = "lugre_friction"
 joint = 1
 F_c = 0.12
+F_s = 0.16
+v_s = 0.3
 sigma_0 = 5.0
+sigma_1 = 0.05
 
 [[effect]]
 name = "coulomb_friction"

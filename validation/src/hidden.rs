@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::laws::{DRY, Law, SMOOTH};
 use super::machine::Machine;
 use super::mechanics::Mechanics;
-use super::presliding::Presliding;
+use super::presliding::{Presliding, Stribeck};
 use super::transmission::Transmission;
 use super::warming::Warming;
 use residyn_core::data::Joint;
@@ -101,14 +101,28 @@ impl Machine {
         let j = hidden.joint.index();
         let drive = &mut self.drives[j];
         match hidden.name.as_str() {
-            "presliding" => {
+            name @ ("presliding" | "lugre_friction") => {
                 let (level, stiffness) = (n("F_c")?, n("sigma_0")?);
-                self.presliding.push((j, Presliding { level, stiffness }));
+                let mut friction = Presliding {
+                    level,
+                    stiffness,
+                    ..Presliding::default()
+                };
+                if name == "lugre_friction" {
+                    friction.damping = n("sigma_1")?;
+                    let (excess, speed) = (n("F_s")? - level, n("v_s")?);
+                    friction.stribeck = Some(Stribeck { excess, speed });
+                }
+                self.presliding.push((j, friction));
             }
             "cable_hysteresis" => {
                 let (level, way) = (n("F")?, n("alpha")?);
-                let stiffness = level / way;
-                self.presliding.push((j, Presliding { level, stiffness }));
+                let loop_of_cable = Presliding {
+                    level,
+                    stiffness: level / way,
+                    ..Presliding::default()
+                };
+                self.presliding.push((j, loop_of_cable));
                 let mut spring = |name: &str| if name == "k" { n("k") } else { Ok(0.0) };
                 let spring = Law::of(SMOOTH, "joint_spring", &mut spring)?;
                 self.smooth.extend(spring.map(|law| (j, law)));
@@ -241,6 +255,16 @@ mod tests {
             hidden("cubic_damping", &[("c", 0.1)]),
             hidden("uneven_friction", &[("F", 0.1), ("a", 0.5)]),
             hidden("presliding", &[("F_c", 0.2), ("sigma_0", 10.0)]),
+            hidden(
+                "lugre_friction",
+                &[
+                    ("F_c", 0.2),
+                    ("F_s", 0.3),
+                    ("v_s", 0.1),
+                    ("sigma_0", 10.0),
+                    ("sigma_1", 0.1),
+                ],
+            ),
             hidden(
                 "cable_hysteresis",
                 &[("k", 0.1), ("F", 0.2), ("alpha", 0.02)],

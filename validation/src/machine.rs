@@ -162,7 +162,7 @@ impl Machine {
             };
         }
         for (j, friction) in &self.presliding {
-            let torque = friction.torque(state.bristle[*j]);
+            let torque = friction.torque(state.bristle[*j], state.v[*j]);
             balance.free[*j] += torque * self.friction_left(*j, time);
             balance.bristle_rate[*j] = friction.rate(state.bristle[*j], state.v[*j]);
         }

@@ -364,7 +364,7 @@ settings! {
         /// A motion lasts this time in s: long enough for another torque to show, short enough that it needs no
         /// controller.
         motion_s: f64 = 2.0,
-        /// The torque ramps have this period in s.
+        /// The torque ramps have this period in s; chirps and reversals last as long.
         ramp_period_s: f64 = 8.0,
         /// An experiment has this many motions.
         motions: usize = 10,

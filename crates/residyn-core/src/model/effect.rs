@@ -55,7 +55,7 @@ pub struct Effect {
     pub valid_if: Option<Formula>,
     /// Simpler effects that are special cases of this one.
     pub contains: Vec<String>,
-    /// Looked for only in place of the effects that it contains, where a model has all of them.
+    /// Looked for only in place of an effect that it contains or, where a motion is compared, of all of them.
     pub refines: bool,
     pub confused_with: Vec<String>,
     /// The motion that shows the effect.

@@ -1,7 +1,10 @@
+use std::f64::consts::TAU;
+
 use super::motion::{Motion, is_turn};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::data::{Joint, Quantity, row_after};
+use crate::data::statistics::median;
+use crate::data::{Joint, Log, Quantity, row_after};
 
 /// The torque, or the command, of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,8 +18,18 @@ enum Drive {
     Added(f64),
     /// A triangle on one joint, from zero up, down and back, with this share of its largest value.
     Ramps(f64),
+    /// A triangle on one joint that turns back again and again, each time further, up to this share of its largest value.
+    Reversals(f64),
+    /// A sine on one joint, with this share of its largest value, that becomes faster: up to [`ROWS_OF_CHIRP`] a period.
+    Chirp(f64),
     Nothing,
 }
+
+/// Periods of a motion of growing reversals.
+const REVERSALS: f64 = 8.0;
+/// Where chirps begin, and the rows of their last period: what one cannot see with these, the logs' sampling does not show.
+const CHIRP_FROM_HZ: f64 = 0.2;
+const ROWS_OF_CHIRP: f64 = 8.0;
 
 /// Where motions begin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,8 +45,8 @@ enum Start {
 /// One experiment that the logged rig might do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MenuItem {
-    /// What to do; `{joint}`, `{speed}` (rad/s or m/s), `{driving}` (torque or command) and `{size}` stand for values
-    /// from the logs.
+    /// What to do; `{joint}`, `{speed}` (rad/s or m/s), `{driving}` (torque or command), `{size}` and `{hz}` stand for
+    /// values from the logs.
     text: &'static str,
     drive: Drive,
     start: Start,
@@ -81,8 +94,17 @@ const fn turning(text: &'static str, torque: f64) -> MenuItem {
     }
 }
 
+const fn shaped(text: &'static str, drive: Drive) -> MenuItem {
+    MenuItem {
+        text,
+        drive,
+        start: Start::Rest,
+        ..AS_LOGGED
+    }
+}
+
 /// Ordered by how little each item changes the user's experiment.
-const MENU: [MenuItem; 12] = [
+const MENU: [MenuItem; 15] = [
     AS_LOGGED,
     MenuItem {
         text: "the same motion sampled four times as often",
@@ -104,12 +126,22 @@ const MENU: [MenuItem; 12] = [
         1.0,
     ),
     logged("the {driving} with its sign reversed", -1.0, 1.0, -1.0),
-    MenuItem {
-        text: "slow {driving} ramps on joint {joint} from standstill to {size}, up and down",
-        drive: Drive::Ramps(0.5),
-        start: Start::Rest,
-        ..AS_LOGGED
-    },
+    shaped(
+        "slow {driving} ramps on joint {joint} from standstill to {size}, up and down",
+        Drive::Ramps(0.5),
+    ),
+    shaped(
+        "small reversals of joint {joint}, by a triangular {driving} that grows from nothing to {size}",
+        Drive::Reversals(0.3),
+    ),
+    shaped(
+        "a chirp on joint {joint} from {hz}, with a {driving} of {size}",
+        Drive::Chirp(0.3),
+    ),
+    shaped(
+        "a chirp on joint {joint} from {hz}, with a {driving} of {size}",
+        Drive::Chirp(1.0),
+    ),
     coasting(
         "let joint {joint} coast without torque from its top speed of {speed}",
         1.0,
@@ -175,7 +207,7 @@ impl MenuItem {
             _ if *self == AS_LOGGED => true,
             Drive::Nothing => coasts,
             Drive::Logged { .. } => problem.top_driving.iter().any(|top| *top > 0.0),
-            Drive::Added(_) | Drive::Ramps(_) => problem.top_driving[joint] > 0.0,
+            _ => problem.top_driving[joint] > 0.0,
         };
         let fastest_s = problem.settings.discriminate.fastest_sampling_s;
         let coarse = (problem.logs.iter()).all(|log| log.median_step() >= fastest_s);
@@ -193,10 +225,9 @@ impl MenuItem {
             Quantity::Torque => ("torque", force),
             _ => ("command", ""),
         };
-        let size = match self.drive {
-            Drive::Added(share) | Drive::Ramps(share) => share * problem.top_driving[joint],
-            _ => 0.0,
-        };
+        let size = self.drive.of_one_joint() * problem.top_driving[joint];
+        let steps_s: Vec<f64> = problem.logs.iter().map(Log::median_step).collect();
+        let hz = 1.0 / (ROWS_OF_CHIRP * median(&steps_s));
         let speed = match self.start {
             Start::TopSpeed(factor) => factor * problem.top_speed[joint],
             _ => 0.0,
@@ -205,6 +236,7 @@ impl MenuItem {
             .replace("{joint}", &joint.to_string())
             .replace("{driving}", driving)
             .replace("{size}", &format!("{size:.2}{unit}"))
+            .replace("{hz}", &format!("{CHIRP_FROM_HZ} to {hz:.0} Hz"))
             .replace("{speed}", &format!("{speed:.1} {length}/s"))
     }
 
@@ -229,9 +261,9 @@ impl MenuItem {
         let settings = &problem.settings.discriminate;
         let window = problem.shooting.windows[w];
         let log = &problem.logs[window.log];
-        let length_s = match self.drive {
-            Drive::Ramps(_) => settings.ramp_period_s,
-            _ => settings.motion_s,
+        let length_s = match self.drive.is_shaped() {
+            true => settings.ramp_period_s,
+            false => settings.motion_s,
         };
         let step_s = (log.median_step() / f64::from(self.finer)).max(length_s / settings.most_rows);
         let rows = (length_s / step_s).round() as usize;
@@ -251,7 +283,7 @@ impl MenuItem {
                 _ => 1.0,
             };
             let at = begin + pace * since;
-            if at > end && !matches!(self.drive, Drive::Ramps(_) | Drive::Nothing) {
+            if at > end && !(self.drive.is_shaped() || self.drive == Drive::Nothing) {
                 break;
             }
             let held = row_after(&log.time, at).max(1) - 1;
@@ -261,11 +293,14 @@ impl MenuItem {
             motion.tau.push(match self.drive {
                 Drive::Logged { factor, .. } => logged.map(|tau| factor * tau).collect(),
                 Drive::Added(share) => with(logged, joint, share * top),
-                Drive::Ramps(share) => {
-                    let ramp = share * top * triangle(since / settings.ramp_period_s);
-                    with(logged.map(|_| 0.0), joint, ramp)
+                drive => {
+                    let shape = drive.shape(since / length_s, (length_s, step_s));
+                    with(
+                        logged.map(|_| 0.0),
+                        joint,
+                        drive.of_one_joint() * top * shape,
+                    )
                 }
-                Drive::Nothing => logged.map(|_| 0.0).collect(),
             });
         }
         motion
@@ -283,6 +318,41 @@ impl MenuItem {
         }
         state
     }
+}
+
+impl Drive {
+    /// Its size, as a share of the joint's largest torque or command; 0 if it is not that of one joint.
+    fn of_one_joint(self) -> f64 {
+        match self {
+            Self::Added(share)
+            | Self::Ramps(share)
+            | Self::Reversals(share)
+            | Self::Chirp(share) => share,
+            Self::Logged { .. } | Self::Nothing => 0.0,
+        }
+    }
+
+    /// Whether it has a shape of its own, whatever was logged.
+    fn is_shaped(self) -> bool {
+        matches!(self, Self::Ramps(_) | Self::Reversals(_) | Self::Chirp(_))
+    }
+
+    /// The shape, between -1 and 1, at a share of its length, both in s.
+    fn shape(self, share: f64, (length_s, step_s): (f64, f64)) -> f64 {
+        match self {
+            Self::Ramps(_) => triangle(share),
+            Self::Reversals(_) => share * triangle((REVERSALS * share).fract()),
+            Self::Chirp(_) => chirp(share, length_s, 1.0 / (ROWS_OF_CHIRP * step_s)),
+            Self::Logged { .. } | Self::Added(_) | Self::Nothing => 0.0,
+        }
+    }
+}
+
+/// A sine whose frequency grows exponentially to `to_hz` at the end of its length.
+fn chirp(share: f64, length_s: f64, to_hz: f64) -> f64 {
+    let growth = (to_hz / CHIRP_FROM_HZ).ln();
+    let cycles = CHIRP_FROM_HZ * length_s * (growth * share).exp_m1() / growth;
+    (TAU * cycles).sin()
 }
 
 /// Torques or commands with `more` added on one joint.
@@ -314,4 +384,37 @@ fn goes_round(problem: &Problem<'_>, joint: Joint) -> bool {
 pub(super) fn spread(count: usize, most: usize) -> Vec<usize> {
     let taken = count.min(most);
     (0..taken).map(|k| k * count / taken).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Angles at which a chirp of 8 s to 50 Hz has gone through its zeros tell its frequency.
+    #[test]
+    fn a_chirp_goes_from_its_first_to_its_last_frequency() {
+        let at = |t_s: f64| chirp(t_s / 8.0, 8.0, 50.0);
+        let crossings = |from_s: f64, to_s: f64| {
+            let times = (0..=10_000).map(|k| from_s + (to_s - from_s) * f64::from(k) / 1e4);
+            let signs: Vec<bool> = times.map(|t_s| at(t_s) > 0.0).collect();
+            signs.windows(2).filter(|pair| pair[0] != pair[1]).count()
+        };
+        assert_eq!(at(0.0), 0.0);
+        // A quarter of a period at 0.2 Hz is reached a little before 1.25 s; in the last 0.2 s there are 9.3 of 10 periods.
+        assert_eq!(crossings(0.01, 1.0), 0);
+        assert!(
+            (18..=20).contains(&crossings(7.8, 8.0)),
+            "{}",
+            crossings(7.8, 8.0)
+        );
+    }
+
+    #[test]
+    fn reversals_grow() {
+        let shape = |share| Drive::Reversals(0.3).shape(share, (8.0, 0.01));
+        assert_eq!(shape(0.0), 0.0);
+        let first = shape(0.25 / REVERSALS);
+        let last = shape((REVERSALS - 0.75) / REVERSALS);
+        assert!(0.0 < first && first < 0.04 && last > 0.9, "{first} {last}");
+    }
 }

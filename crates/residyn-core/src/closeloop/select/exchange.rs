@@ -54,22 +54,22 @@ pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted, limit: f64) -> V
 }
 
 /// The effects of a model with all that may replace them. Transmissions replace each other alone: what they are confused with
-/// does not hide them where they are added, and explains less. What refines others takes the place of all of them.
+/// does not hide them where they are added, and explains less. A motion tells what refines others only from all of them.
 fn swaps(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Swap> {
+    let by_torques = problem.error_model == ErrorModel::InverseDynamics;
     let mut swaps = Vec::new();
     for place in problem.added(&fitted.model) {
         let mut rest = fitted.model.effects.clone();
         let old = rest.remove(place);
-        let has = |part: &String| {
-            let own =
-                |effect: &FittedEffect| effect.joint == old.joint && effect.effect.name == *part;
-            fitted.model.effects.iter().any(own)
+        let is_there = |part: &String| {
+            let mut own = fitted.model.effects.iter();
+            own.any(|own| own.joint == old.joint && own.effect.name == *part)
         };
         let is_like = |new: &&Effect| {
             let is_counted = new.parameters.iter().any(|parameter| parameter.whole);
             let is_another = old.effect.is_confused_with(new)
                 && old.effect.is_transmission() == new.is_transmission()
-                && (!new.refines || new.contains.iter().all(has));
+                && (!new.refines || by_torques || new.contains.iter().all(is_there));
             is_another || is_counted && new.name == old.effect.name
         };
         let like: Vec<Effect> = problem.effects().iter().filter(is_like).cloned().collect();

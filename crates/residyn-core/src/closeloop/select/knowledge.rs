@@ -47,11 +47,18 @@ impl Knowledge {
     /// the declared bodies distinguish from errors of theirs, as a rotor next to a link, is distinguished on a rig that
     /// commands drive if most machines have it: anything else would be an error of the bodies under another name.
     pub fn distinguishes(&self, own: &[usize]) -> bool {
+        self.distinguishes_all_of(own, |_| true)
+    }
+
+    /// As [`Knowledge::distinguishes`], for those of the values that are asked for.
+    pub fn distinguishes_all_of(&self, own: &[usize], is_asked: impl Fn(usize) -> bool) -> bool {
         let suffices = |of: &Option<Eliminated>, for_usual: bool| {
             let shares = of.as_ref().and_then(|of| of.own_shares(own));
             shares.is_some_and(|shares| {
                 let mut own = own.iter().zip(shares);
-                own.all(|(i, share)| self.usual[*i] != for_usual || share > self.least)
+                own.all(|(i, share)| {
+                    self.usual[*i] != for_usual || !is_asked(*i) || share > self.least
+                })
             })
         };
         suffices(&self.logs, false) && self.all.as_ref().is_none_or(|all| suffices(all, true))

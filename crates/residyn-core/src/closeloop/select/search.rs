@@ -529,12 +529,16 @@ impl<'a> Search<'a> {
     }
 
     /// A trial in which what logs need not determine of its effects is held, fitted from there to a loss of `below`; `None`
-    /// if there is nothing of the kind, or if no valid set results.
+    /// if there is nothing of the kind, if other effects are not determined beside it either, which would make up for
+    /// where it is held, or if no valid set results.
     fn with_unknown_held(&self, trial: &Trial, below: f64) -> Option<Trial> {
         let problem = self.problem;
         let added = trial.added(problem);
         let held: Vec<_> = added.iter().map(FittedEffect::with_unknown_held).collect();
         held.iter().flatten().next()?;
+        if !trial.determines_what_is_not_held(problem) {
+            return None;
+        }
         let set = held.into_iter().zip(added);
         let set = set.map(|(held, as_it_is)| held.unwrap_or_else(|| as_it_is.clone()));
         let found = self.fitted_from(trial, &set.collect::<Vec<_>>(), below);

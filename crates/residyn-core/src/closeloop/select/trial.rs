@@ -107,6 +107,16 @@ impl Trial {
     }
 
     fn is_determined(&self, problem: &Problem<'_>) -> bool {
+        self.determines(problem, |_| true)
+    }
+
+    /// Whether the logs distinguish all values of those added effects that may not be held where their fit starts.
+    pub fn determines_what_is_not_held(&self, problem: &Problem<'_>) -> bool {
+        self.determines(problem, |effect| effect.with_unknown_held().is_none())
+    }
+
+    /// Whether the logs distinguish the values of these added effects from all others.
+    fn determines(&self, problem: &Problem<'_>, is_asked: impl Fn(&FittedEffect) -> bool) -> bool {
         let (model, fit) = (&self.fitted.model, &self.fitted.fit);
         let added = problem.added(model);
         if added.is_empty() {
@@ -117,7 +127,13 @@ impl Trial {
         let is_base = |i: &&usize| fit.columns[**i].parameter < first;
         let base = message.iter().filter(is_base).count();
         let (base, own) = message.split_at(base);
-        Knowledge::of(problem, model, fit, base).distinguishes(own)
+        let asked = added.filter(|k| is_asked(&model.effects[*k]));
+        let places: Vec<_> = asked.map(|k| model.place_of(k)).collect();
+        let is_asked = |i: usize| {
+            let mut places = places.iter();
+            places.any(|place| place.contains(&fit.columns[i].parameter))
+        };
+        Knowledge::of(problem, model, fit, base).distinguishes_all_of(own, is_asked)
     }
 
     /// Whether the values of each added effect are consistent with each other and none is at a bound.
