@@ -31,15 +31,19 @@ impl ErrorModel {
     /// ones only, if it is known what the law asks for. The swing of a motor against its link is faster than torques are
     /// compared.
     fn shows(self, effect: &Effect, declared: &Model) -> bool {
+        let by_law = declared.driven_by() == Quantity::Command;
         match self {
-            Self::OutputError => effect.shows_in == ShowsIn::Any,
+            Self::OutputError => match effect.shows_in {
+                ShowsIn::Any => true,
+                ShowsIn::Law => by_law,
+                ShowsIn::Torques | ShowsIn::LawTorques => false,
+            },
             Self::InverseDynamics => {
                 !matches!(effect.entry, Entry::Reading(_))
                     && !effect.is_transmission()
                     && (effect.distinguishes_command()
                         || declared.knows_law() && effect.limits_command())
-                    && (effect.shows_in != ShowsIn::LawTorques
-                        || declared.driven_by() == Quantity::Command)
+                    && (by_law || matches!(effect.shows_in, ShowsIn::Any | ShowsIn::Torques))
             }
         }
     }
@@ -88,6 +92,16 @@ impl ErrorModel {
 mod tests {
     use super::ErrorModel;
     use crate::model::Library;
+
+    #[test]
+    fn a_hot_winding_shows_where_a_law_turns_commands_into_torques() {
+        let library = Library::built_in();
+        let heat = library.effect("winding_heat").unwrap();
+        for compared in [ErrorModel::OutputError, ErrorModel::InverseDynamics] {
+            let shows = |system: &str| compared.shows(heat, &library.model(system).unwrap());
+            assert!(shows("servo") && !shows("pendulum"), "{compared:?}");
+        }
+    }
 
     #[test]
     fn torques_show_a_limit_only_if_the_law_is_known() {

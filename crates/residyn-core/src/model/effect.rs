@@ -88,6 +88,8 @@ pub enum ShowsIn {
     Torques,
     /// Of torques that the law of a drive asks for.
     LawTorques,
+    /// Any, where the law of a drive turns commands into torques.
+    Law,
 }
 
 /// The joints that have the effect alike, if one of them has it: it belongs to how they are built.

@@ -294,6 +294,7 @@ impl Word for ShowsIn {
         ("any", Self::Any),
         ("torques", Self::Torques),
         ("law torques", Self::LawTorques),
+        ("law", Self::Law),
     ];
 }
 
