@@ -41,6 +41,8 @@ fn the_full_grid_has_cells_of_every_group_and_hides_every_kind_of_effect() {
     let hidden: Vec<&Hidden> = all.flat_map(|cell| &cell.effects).collect();
     let mut missing = library.effects().to_vec();
     missing.retain(|effect| !hidden.iter().any(|hidden| hidden.name == effect.name));
+    // The rigs are driven by torques. What a voltage heats is hidden by MuJoCo's motor, in slow/drivetrains.rs.
+    missing.retain(|effect| effect.name != "winding_heat");
     let names: Vec<&String> = missing.iter().map(|effect| &effect.name).collect();
     assert!(names.is_empty(), "no cell hides {names:?}");
 }

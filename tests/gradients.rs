@@ -38,12 +38,16 @@ fn difference(program: &Program, joints: usize, point: &[f64], k: usize, h: f64)
 
 /// Derivatives of fourth order (Richardson), or `None` if a kink is within reach: there the two differences disagree by
 /// more than their error of order h^2.
-fn slope(program: &Program, joints: usize, point: &[f64], k: usize) -> Option<Vec<f64>> {
-    // What acts within a step changes with the inverse of its length.
-    let least = if program.inputs()[k] == "step_s" {
-        0.0
-    } else {
-        0.1
+fn slope(model: &Dynamics, point: &[f64], k: usize) -> Option<Vec<f64>> {
+    let (program, joints) = (&model.program, model.joints);
+    let layout = model.layout();
+    let is_internal = layout.internal().contains(&k) || layout.starts().contains(&k);
+    let least = match program.inputs()[k].as_str() {
+        // What acts within a step changes with the inverse of its length.
+        "step_s" => 0.0,
+        // A deflection moves over as much.
+        _ if is_internal => 0.02,
+        _ => 0.1,
     };
     let h = 3e-4 * point[k].abs().max(least);
     let coarse = difference(program, joints, point, k, h);
@@ -60,9 +64,7 @@ fn smooth_point(model: &Dynamics, rng: &mut ChaCha8Rng) -> (Vec<f64>, Vec<Vec<f6
     for _ in 0..20 {
         let point = point(model, rng);
         let inputs = 0..point.len();
-        let slopes: Option<Vec<_>> = inputs
-            .map(|k| slope(&model.program, model.joints, &point, k))
-            .collect();
+        let slopes: Option<Vec<_>> = inputs.map(|k| slope(model, &point, k)).collect();
         if let Some(slopes) = slopes {
             return (point, slopes);
         }

@@ -563,9 +563,10 @@ mod slow {
             let mut log = simulate(&case.dynamics, &start, 3.0, 1500, seed);
             log.path = case.name.clone().into();
             let runs_away = log.q.iter().flatten().any(|q| !(q.abs() < 1e3));
-            // No spring winds up over turns: an apparent one is an angle in degrees.
+            // No spring winds up over turns: an apparent one is an angle in degrees. A position loop, whose targets are taken for
+            // torques here, is a spring.
             let turns = log.q.iter().flatten().any(|q| q.abs() > TAU);
-            let has_spring = ["joint_spring", "cable_hysteresis"];
+            let has_spring = ["joint_spring", "cable_hysteresis", "servo"];
             let is_wound = turns && has_spring.iter().any(|spring| case.name.contains(spring));
             // A motor on a soft spring swings against torques that are slower than its resonance.
             let swings = case.name.contains("joint_elasticity");

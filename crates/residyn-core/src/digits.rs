@@ -2,7 +2,8 @@
 
 use crate::model::Parameter;
 
-/// A parameter's value and the ends of its interval, rounded to a twentieth of the interval's width.
+/// A parameter's value and the ends of its interval, rounded to a twentieth of the interval's width; whole numbers without an
+/// interval as they are.
 pub fn digits(parameter: &Parameter) -> (String, Option<[String; 2]>) {
     digits_of(parameter.value, parameter.ci95)
 }
@@ -11,6 +12,8 @@ pub fn digits(parameter: &Parameter) -> (String, Option<[String; 2]>) {
 pub fn digits_of(value: f64, ci95: Option<[f64; 2]>) -> (String, Option<[String; 2]>) {
     let resolution = match ci95 {
         Some([low, high]) if (high - low).is_finite() => 0.05 * (high - low),
+        // A number that was set or counted.
+        None if value.fract() == 0.0 => 1.0,
         _ => 1e-4 * value.abs(),
     };
     let number = |x: f64| rounded(x, resolution);

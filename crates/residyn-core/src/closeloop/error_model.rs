@@ -90,8 +90,10 @@ impl ErrorModel {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::ErrorModel;
-    use crate::model::Library;
+    use crate::model::{Effect, Library};
 
     #[test]
     fn a_hot_winding_shows_where_a_law_turns_commands_into_torques() {
@@ -100,6 +102,22 @@ mod tests {
         for compared in [ErrorModel::OutputError, ErrorModel::InverseDynamics] {
             let shows = |system: &str| compared.shows(heat, &library.model(system).unwrap());
             assert!(shows("servo") && !shows("pendulum"), "{compared:?}");
+        }
+    }
+
+    #[test]
+    fn torques_do_not_show_a_force_that_follows_them() {
+        let file = |rate: &str| {
+            let text = format!(
+                "[effect]\nname = \"own\"\nabout = \"\"\nforce = \"c * w\"\n\n[states]\n\
+                 w = {{ rate = \"{rate}\", unit = \"1\" }}\n\n[parameters]\nc = {{ unit = \"1\", typical = 1 }}\n"
+            );
+            Effect::from_text(Path::new("own.toml"), &text).unwrap()
+        };
+        let model = Library::built_in().model("acrobot").unwrap();
+        for (rate, shows) in [("(tau - w) / 0.01", false), ("(qd - w) / 0.01", true)] {
+            let found = ErrorModel::InverseDynamics.shows(&file(rate), &model);
+            assert_eq!(found, shows, "{rate}");
         }
     }
 

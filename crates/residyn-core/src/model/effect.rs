@@ -503,7 +503,7 @@ impl Effect {
     pub fn distinguishes_command(&self) -> bool {
         match &self.entry {
             Entry::Torque(formula) => grows(&self.acting(formula, &self.typical())),
-            Entry::Force(formula) => !formula.names().contains(&"tau"),
+            Entry::Force(_) => !self.mentions().contains("tau"),
             _ => true,
         }
     }

@@ -3,7 +3,8 @@
 use super::{Block, folded, heading, paragraph, paragraphs};
 use crate::schema::Report;
 use crate::wording::{FITTED, WITH_EFFECTS, p_value};
-use residyn_core::closeloop::{Proposal, UNKNOWN};
+use residyn_core::closeloop::{ErrorModel, Probed, Proposal, UNKNOWN};
+use residyn_core::data::Joint;
 
 /// What is left of the residuals, and a formula for it.
 pub(super) fn left(report: &Report) -> Vec<Block> {
@@ -24,7 +25,8 @@ pub(super) fn left(report: &Report) -> Vec<Block> {
     );
     let said = [Some(structure(report)), network(report), Some(size)];
     let said = paragraphs(said.into_iter().flatten());
-    let proposal = report.unexplained.proposal.as_ref().map(proposed);
+    let proposal = report.unexplained.proposal.as_ref();
+    let proposal = proposal.map(|proposal| proposed(report, proposal));
     let title = vec![heading("What is left")];
     [title, said, Vec::from_iter(proposal)].concat()
 }
@@ -38,8 +40,13 @@ pub(crate) fn structure(report: &Report) -> String {
     let structure = match left.place.as_str() {
         UNKNOWN => format!(
             "The residuals are not white noise ({p}; {share:.0} % of their variance exceeds it), but they are not a \
-             smooth function of angle, speed, torque or time. Candidates are effects that the library lacks: a link that \
-             bends, play with a motor behind it, a periodic disturbance."
+             smooth function of angle, speed, torque or time. Candidates are effects that were not looked for: {}a link \
+             that bends, a periodic disturbance.",
+            match report.compared {
+                ErrorModel::OutputError => "",
+                // Torques follow from a smoothed motion, which is slower than a motor swings against its link.
+                ErrorModel::InverseDynamics => "a spring or play between a motor and its link, ",
+            }
         ),
         place if left.is_significant() => format!("The residual depends on {place} ({p})."),
         _ if left.p_value < settings.significance => format!(
@@ -70,7 +77,25 @@ fn network(report: &Report) -> Option<String> {
     ))
 }
 
-fn proposed(proposal: &Proposal) -> Block {
+/// On which variables the residual of a joint depends, by how far flexible shapes over them lower the loss.
+fn sensitivity(report: &Report, joint: Joint) -> String {
+    let probes = report.unexplained.left.probes.iter();
+    let mut seen: Vec<&Probed> = probes
+        .filter(|probe| probe.joint == joint && probe.gain > 0.0)
+        .collect();
+    seen.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    if seen.is_empty() {
+        return "No flexible shape over the present angle, speed, torque or time lowers the loss on left-out blocks.".to_owned();
+    }
+    let shape = |probe: &&Probed| format!("`{}` {:.1} %", probe.place, 100.0 * probe.gain);
+    let shapes: Vec<String> = seen.iter().map(shape).collect();
+    format!(
+        "Flexible shapes over these variables lower the loss on left-out blocks: {}.",
+        shapes.join(", ")
+    )
+}
+
+fn proposed(report: &Report, proposal: &Proposal) -> Block {
     let about = format!(
         "Force `{}` removes {:.0} % of the residual on blocks left out of its fit, and is supported only by that fit. As an \
          effect file, for your own folder of effects:",
@@ -80,7 +105,11 @@ fn proposed(proposal: &Proposal) -> Block {
     let file = Block::Code(proposal.file.clone());
     folded(
         format!("A proposal, not a finding, for joint {}", proposal.joint),
-        vec![paragraph(about), file],
+        vec![
+            paragraph(sensitivity(report, proposal.joint)),
+            paragraph(about),
+            file,
+        ],
     )
 }
 
