@@ -60,7 +60,7 @@ const RIGS: [Rig; 5] = [
         actuators: r#"<motor joint="driven"/>
             <dcmotor joint="driven" motorconst="1e-6" resistance="1" lugre="40 0.2 0.2 0.3 0.1"/>"#,
         amplitude: 0.5,
-        log_s: [0.005, 15.0],
+        log_s: [0.005, 10.0],
         torque: "cmd1",
         lacks: "lugre_friction",
         values: &[0.2, 0.3, 0.1, 40.0, 0.2],
@@ -120,14 +120,14 @@ fn drivetrains_of_mujoco_are_named_with_their_values() {
         scratch.file("arm.toml", rig.model());
         let numbers = [rig.amplitude, rig.log_s[0], rig.log_s[1]].map(|number| number.to_string());
         let drawing = scratch.path("rig.xml");
-        let logs = ["run1.csv", "run2.csv", "run3.csv"].map(|name| scratch.path(name));
+        let logs = ["run1.csv", "run2.csv", "run3.csv", "run4.csv"].map(|name| scratch.path(name));
         let numbers = numbers.iter().map(Path::new);
         let arguments: Vec<&Path> = std::iter::once(drawing.as_path())
             .chain(numbers)
             .chain(logs.iter().map(|log| log.as_path()))
             .collect();
         client("drivetrain.py", &arguments);
-        let logs = "--train run1.csv run2.csv --test run3.csv";
+        let logs = "--train run1.csv run2.csv run3.csv --test run4.csv";
         let report = scratch.json(&format!("closeloop --model arm.toml {logs} --out out"));
         assert_eq!(report["verdict"], "explained", "{}: {report:#}", rig.lacks);
         assert_eq!(names(&report), [rig.lacks]);
