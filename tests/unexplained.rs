@@ -209,7 +209,7 @@ fn a_force_with_a_memory_is_proposed_with_the_rate_of_its_state() {
         let found = proposed(&logs_of_first(model, 1), 1).unwrap();
         assert!(found.formula.contains(rate), "{found:?}");
         assert!(found.explains > 0.8, "{found:?}");
-        let library = library(&[found.file.clone()]);
+        let library = library(std::slice::from_ref(&found.file));
         let parameters = &library.effect("proposed").unwrap().parameters;
         let typical = [&parameters[0], parameters.last().unwrap()].map(|own| own.typical);
         let is_near = |(own, truth): (f64, f64)| (own / truth - 1.0).abs() < 0.1;
