@@ -524,6 +524,10 @@ impl Effect {
         let Entry::Torque(formula) = &self.entry else {
             return None;
         };
+        // What it multiplies a command by depends on its states.
+        if !self.states.is_empty() {
+            return None;
+        }
         let acting = self.acting(formula, values);
         let gain = acting.last()? / commands().last()?;
         let mut pairs = acting.iter().zip(commands());
