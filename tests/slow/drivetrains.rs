@@ -1,5 +1,5 @@
-//! Drivetrains that MuJoCo simulates, by laws of its own: a second body on a spring or with play, and its DC motor with friction that gives
-//! before it slips, with cogging, and with a winding that heats up.
+//! Drivetrains that MuJoCo simulates, by laws of its own: a second body on a spring or with play, and its DC motor with
+//! friction that gives before it slips, with cogging, and with a winding that heats up.
 
 use std::path::Path;
 

@@ -337,7 +337,7 @@ impl Drive {
         matches!(self, Self::Ramps(_) | Self::Reversals(_) | Self::Chirp(_))
     }
 
-    /// The shape, between -1 and 1, at a share of its length, both in s.
+    /// The shape, between -1 and 1, when this share of a motion of `length_s` in rows of `step_s` is over.
     fn shape(self, share: f64, (length_s, step_s): (f64, f64)) -> f64 {
         match self {
             Self::Ramps(_) => triangle(share),
