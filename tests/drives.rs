@@ -11,7 +11,7 @@ use residyn_formats::{ExportModel, find};
 use serde_json::Value;
 
 use crate::support::catalogue::{assert_near, points};
-use crate::support::clients::client;
+use crate::support::clients::{client, interpreter_for};
 use crate::support::reports::estimate;
 use crate::support::tables::{effects, rows, says_words};
 use crate::support::{Scratch, mechanisms, says};
@@ -333,8 +333,7 @@ mod slow {
 
     #[test]
     fn what_a_drawing_of_a_servo_arm_lacks_is_named() {
-        if std::env::var_os("RESIDYN_PYTHON").is_none() {
-            eprintln!("SKIPPED: RESIDYN_PYTHON is not set; run tests/run");
+        if interpreter_for("servo.py").is_none() {
             return;
         }
         let scratch = Scratch::new();
@@ -458,8 +457,7 @@ mod slow {
     /// judges.
     #[test]
     fn what_a_drawing_of_two_legs_lacks_is_named_on_the_leg_that_lacks_it() {
-        if std::env::var_os("RESIDYN_PYTHON").is_none() {
-            eprintln!("SKIPPED: RESIDYN_PYTHON is not set; run tests/run");
+        if interpreter_for("servo.py").is_none() {
             return;
         }
         let (worn, usual) = (geared(0.4), geared(0.15));
@@ -477,8 +475,7 @@ mod slow {
     /// A third of the targets asks the knee for more than its drive gives, which is less than its drawing says.
     #[test]
     fn a_limit_that_a_drive_reaches_is_named_beside_what_the_motors_have() {
-        if std::env::var_os("RESIDYN_PYTHON").is_none() {
-            eprintln!("SKIPPED: RESIDYN_PYTHON is not set; run tests/run");
+        if interpreter_for("servo.py").is_none() {
             return;
         }
         let (worn, usual) = (geared(0.4), geared(0.15));

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::support::Scratch;
-use crate::support::clients::client;
+use crate::support::clients::{client, interpreter_for};
 use crate::support::reports::names;
 
 /// A mass of 1 kg on an arm of 0.5 m, and what drives it.
@@ -110,8 +110,7 @@ impl Rig {
 
 #[test]
 fn drivetrains_of_mujoco_are_named_with_their_values() {
-    if std::env::var_os("RESIDYN_PYTHON").is_none() {
-        eprintln!("SKIPPED: RESIDYN_PYTHON is not set; run tests/run");
+    if interpreter_for("drivetrain.py").is_none() {
         return;
     }
     for rig in &RIGS {

@@ -1,5 +1,6 @@
 //! Other programs that read what Residyn writes. A test whose program is missing says so loudly, and passes.
 
+use std::ffi::OsString;
 use std::io::Write;
 use std::path::Path;
 use std::process::Command;
@@ -14,13 +15,21 @@ pub fn not_in_a_quick_run() {
     );
 }
 
-/// Run one of the scripts in `tests/clients`; without an interpreter, print a prominent note.
-pub fn client(script: &str, arguments: &[&Path]) {
-    not_in_a_quick_run();
-    let Some(python) = std::env::var_os("RESIDYN_PYTHON") else {
+/// The interpreter of the scripts in `tests/clients`; without one, a prominent note says that this one is skipped.
+pub fn interpreter_for(script: &str) -> Option<OsString> {
+    let python = std::env::var_os("RESIDYN_PYTHON");
+    if python.is_none() {
         let note = format!("SKIPPED {script}: RESIDYN_PYTHON is not set; run tests/run\n");
         // Not eprintln!, which the test harness swallows.
         let _ = std::io::stderr().write_all(note.as_bytes());
+    }
+    python
+}
+
+/// Run one of the scripts in `tests/clients`, if there is an interpreter.
+pub fn client(script: &str, arguments: &[&Path]) {
+    not_in_a_quick_run();
+    let Some(python) = interpreter_for(script) else {
         return;
     };
     let run = Command::new(python)

@@ -29,11 +29,15 @@ struct Swap {
 pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted, limit: f64) -> Vec<Exchange> {
     let declared = problem.declared.effects.len();
     let fitted = fitted.clone().without_windows();
+    let swaps = promising(problem, &fitted, swaps(problem, &fitted), limit);
+    if swaps.is_empty() {
+        return Vec::new();
+    }
     let Some(below) = promising_on_sample(problem, &fitted) else {
         return Vec::new();
     };
     let mut sets = Vec::new();
-    for Swap { place, new } in promising(problem, &fitted, swaps(problem, &fitted), limit) {
+    for Swap { place, new } in swaps {
         let mut rest = fitted.clone();
         let old = rest.model.effects.remove(place);
         let is_itself = new.effect.name == old.effect.name;
