@@ -144,6 +144,18 @@ qdd1 = "-17.4*sin(q1) + 4.6*(tau1 - k*qd2)"
 qdd2 = "qd1 - 20*abs(qd1)*qd2"
 "#;
 
+/// A damper in series with a spring: it feels what the speed was, modelled as the second joint's velocity.
+const YIELDING: &str = r#"
+[system]
+name = "yielding"
+joints = 2
+[parameters]
+k = { value = 0.4, unit = "N m s/rad" }
+[dynamics]
+qdd1 = "-17.4*sin(q1) + 4.6*(tau1 - k*qd2)"
+qdd2 = "(qd1 - qd2) / 0.3"
+"#;
+
 /// Logs of the first of two joints.
 fn logs_of_first(model: &str, seed: u64) -> Vec<Log> {
     let folder = tempfile::tempdir().unwrap();
@@ -185,6 +197,24 @@ fn effects_with_internal_state_are_not_taken_for_noise() {
                 "{model}, {effects:?}: {left:?}"
             );
         }
+    }
+}
+
+#[test]
+fn a_force_with_a_memory_is_proposed_with_the_rate_of_its_state() {
+    for (model, rate, size, scale) in [
+        (YIELDING, "dw1/dt = (qd1 - w1) / ", 0.4, 0.3),
+        (PRESLIDING, "dw1/dt = (qd1 - abs(qd1) * w1) / ", 0.2, 0.05),
+    ] {
+        let found = proposed(&logs_of_first(model, 1), 1).unwrap();
+        assert!(found.formula.contains(rate), "{found:?}");
+        assert!(found.explains > 0.8, "{found:?}");
+        let library = library(std::slice::from_ref(&found.file));
+        let parameters = &library.effect("proposed").unwrap().parameters;
+        let typical = [&parameters[0], parameters.last().unwrap()].map(|own| own.typical);
+        let is_near = |(own, truth): (f64, f64)| (own / truth - 1.0).abs() < 0.1;
+        let both = typical.into_iter().zip([size, scale]);
+        assert!(both.into_iter().all(is_near), "{found:?}");
     }
 }
 

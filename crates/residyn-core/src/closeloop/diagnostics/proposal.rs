@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::unexplained::Unexplained;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::closeloop::select::{Losses, best_start, gain, screened_cost};
+use crate::closeloop::select::{Losses, best_start, gain, is_consistent, screened_cost};
 use crate::data::{Joint, Quantity};
 use crate::model::{Effect, FittedEffect};
 
@@ -25,12 +25,32 @@ pub struct Proposal {
     pub file: String,
 }
 
-/// A term in the joint's variables, and the powers of q, qd, tau and t in its unit.
-type Term = (&'static str, [i32; 4]);
+/// A term of a force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Term {
+    /// In the joint's variables and, if it has a memory, its state `w`.
+    text: &'static str,
+    /// Powers of q, qd, tau and t in its unit.
+    powers: [i32; 4],
+    memory: Option<Memory>,
+}
+
+/// How the state of a term moves: a filtered input, or a loop that depends on the way and not on speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Memory {
+    rate: &'static str,
+    /// Of the state.
+    unit: &'static str,
+    /// The parameter in the rate, which is one of these two.
+    scale: &'static str,
+}
+
+const TIME: &str = "T = { unit = \"s\", typical = TYPICAL, bounds = [0.001, 1000], search = [0.02, 0.1, 0.5, 2, 10] }";
+const WAY: &str = "alpha = { unit = \"rad\", typical = TYPICAL, bounds = [0.0001, 10], search = [0.003, 0.03, 0.3] }";
 
 /// Terms of forces in machines. Linear, square and cubic terms have units that give their coefficients a meaning;
 /// functions of the angle and signs have no units.
-const TERMS: [Term; 31] = [
+const TERMS: [(&str, [i32; 4]); 31] = [
     ("1", [0, 0, 0, 0]),
     ("q", [1, 0, 0, 0]),
     ("sin(q)", [0, 0, 0, 0]),
@@ -63,9 +83,53 @@ const TERMS: [Term; 31] = [
     ("t*qd", [0, 1, 0, 1]),
     ("t*tau", [0, 0, 1, 1]),
 ];
-/// A short sum of terms for the force that the model lacks on the joint with the largest unexplained residual: terms
-/// are added while they lower the loss on blocks left out of the fit. `None` if the residual is not significant, or no
-/// term fits it.
+
+/// Terms with a memory: their rates and units, where the input is filtered.
+const REMEMBERED: [(&str, [i32; 4], Memory); 8] = [
+    ("w", [1, 0, 0, 0], filter("(q - w) / T", "rad")),
+    ("w", [0, 1, 0, 0], filter("(qd - w) / T", "rad/s")),
+    ("w", [0, 0, 1, 0], filter("(tau - w) / T", "N m")),
+    ("w", [0, 0, 0, 0], filter("(sign(qd) - w) / T", "1")),
+    ("w*sign(qd)", [0, 0, 0, 0], filter("(1 - w) / T", "1")),
+    ("w*qd", [0, 1, 0, 0], filter("(1 - w) / T", "1")),
+    ("w*tau", [0, 0, 1, 0], filter("(1 - w) / T", "1")),
+    (
+        "w",
+        [0, 0, 0, 0],
+        Memory {
+            rate: "(qd - abs(qd) * w) / alpha",
+            unit: "1",
+            scale: WAY,
+        },
+    ),
+];
+
+const fn filter(rate: &'static str, unit: &'static str) -> Memory {
+    Memory {
+        rate,
+        unit,
+        scale: TIME,
+    }
+}
+
+/// All terms, of which a sum has at most one with a memory.
+fn terms() -> impl Iterator<Item = Term> {
+    let plain = TERMS.iter().map(|&(text, powers)| Term {
+        text,
+        powers,
+        memory: None,
+    });
+    let remembered = REMEMBERED.iter().map(|&(text, powers, memory)| Term {
+        text,
+        powers,
+        memory: Some(memory),
+    });
+    plain.chain(remembered)
+}
+
+/// A short sum of terms for the force that the model lacks on the joint with the largest unexplained residual; one of them may have
+/// a state. Terms are added while they lower the loss on blocks left out of the fit. `None` if the residual is not significant, or
+/// no term fits it.
 pub fn proposal(problem: &Problem<'_>, fitted: &Fitted, left: &Unexplained) -> Option<Proposal> {
     if !left.is_significant() {
         return None;
@@ -101,10 +165,37 @@ struct Sum {
     losses: Vec<f64>,
 }
 
-/// The sum with one more term, the one that lowers the loss most.
-fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -> Option<Sum> {
-    let screen = |term: &Term| {
-        let terms = [terms, &[*term]].concat();
+/// The sum with one more term, the one that lowers the loss most. What has no state goes first: a filter that is fast enough, or a
+/// loop that is small enough, is its input.
+fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, sum: &[Term]) -> Option<Sum> {
+    let is_new = |term: &Term| !sum.contains(term);
+    let (remembered, plain): (Vec<Term>, Vec<Term>) = terms()
+        .filter(is_new)
+        .partition(|term| term.memory.is_some());
+    let best = |of: Vec<Term>| best_of(problem, model, joint, sum, of);
+    let plain = best(plain);
+    if sum.iter().any(|term| term.memory.is_some()) {
+        return plain;
+    }
+    let noteworthy = problem.settings.diagnostics.noteworthy_share;
+    match (plain, best(remembered)) {
+        (Some(plain), Some(remembered)) if gain(&plain.losses, &remembered.losses) < noteworthy => {
+            Some(plain)
+        }
+        (plain, remembered) => remembered.or(plain),
+    }
+}
+
+/// The sum with that one of these terms which lowers the loss most, and no value of which is at the end of its range.
+fn best_of(
+    problem: &Problem<'_>,
+    model: &Fitted,
+    joint: Joint,
+    sum: &[Term],
+    others: Vec<Term>,
+) -> Option<Sum> {
+    let screen = |term: Term| {
+        let terms = [sum, &[term]].concat();
         let effect = effect(&terms);
         if !problem.shows(&effect) {
             return None;
@@ -118,17 +209,18 @@ fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -
         let cost = screened_cost(problem, model, &start)?;
         Some((terms, start, cost))
     };
-    let others = TERMS.par_iter().filter(|term| !terms.contains(term));
-    let mut screened: Vec<(Vec<Term>, FittedEffect, f64)> = others.filter_map(screen).collect();
+    let screened = others.into_par_iter().filter_map(screen);
+    let mut screened: Vec<(Vec<Term>, FittedEffect, f64)> = screened.collect();
     screened.sort_by(|a, b| a.2.total_cmp(&b.2));
     screened.truncate(problem.settings.proposal.fitted_terms);
     let fit = |(terms, start, _): (Vec<Term>, FittedEffect, f64)| {
         let longer = model.effects_and(&[start]);
         let fitted = problem.with_effects(model, longer).ok()?;
-        Some(Sum {
+        let effect = fitted.model.effects.last()?.clone();
+        is_consistent(&effect).then(|| Sum {
             terms,
             losses: Losses::of(problem, &fitted).of_joint(joint),
-            effect: fitted.model.effects.last()?.clone(),
+            effect,
         })
     };
     let fitted: Vec<Sum> = screened.into_par_iter().filter_map(fit).collect();
@@ -158,26 +250,34 @@ fn digits(value: f64) -> String {
 }
 
 fn effect(terms: &[Term]) -> Effect {
-    let text = file(terms, &vec![1.0; terms.len()]);
+    let text = file(terms, &vec![1.0; terms.len() + 1]);
     Effect::from_text(Path::new("proposal.toml"), &text).expect("terms are formulas of an effect")
 }
 
-/// An effect file with one coefficient a term, with these typical magnitudes.
+/// An effect file with one coefficient a term and, if one has a memory, its scale, with these typical magnitudes.
 fn file(terms: &[Term], magnitudes: &[f64]) -> String {
-    let weighed = |((term, _), k): (&Term, usize)| format!("c_{k}*{term}");
+    let weighed = |(term, k): (&Term, usize)| format!("c_{k}*{}", term.text);
     let sum: Vec<String> = terms.iter().zip(1..).map(weighed).collect();
+    let memory = terms.iter().find_map(|term| term.memory);
     let mut text = format!(
         "[effect]\nname = \"proposed\"\nabout = \"a formula fitted to the residual; not a finding\"\n\
-         force = \"{}\"\n\n[parameters]\n",
+         force = \"{}\"\n\n",
         sum.join(" + ")
     );
-    for (((_, powers), magnitude), k) in terms.iter().zip(magnitudes).zip(1..) {
-        let typical = digits(magnitude.max(1e-9));
-        let _ = writeln!(
+    if let Some(Memory { rate, unit, .. }) = memory {
+        let _ = write!(
             text,
-            "c_{k} = {{ unit = \"{}\", typical = {typical} }}",
-            unit(*powers)
+            "[states]\nw = {{ rate = \"{rate}\", unit = \"{unit}\" }}\n\n"
         );
+    }
+    let typical = |magnitude: &f64| digits(magnitude.max(1e-9));
+    text += "[parameters]\n";
+    for ((term, magnitude), k) in terms.iter().zip(magnitudes).zip(1..) {
+        let (unit, typical) = (unit(term.powers), typical(magnitude));
+        let _ = writeln!(text, "c_{k} = {{ unit = \"{unit}\", typical = {typical} }}");
+    }
+    if let Some((memory, scale)) = memory.zip(magnitudes.get(terms.len())) {
+        let _ = writeln!(text, "{}", memory.scale.replace("TYPICAL", &typical(scale)));
     }
     text
 }
@@ -218,8 +318,9 @@ mod tests {
 
     #[test]
     fn every_term_is_a_valid_effect_formula() {
-        for term in TERMS {
-            assert_eq!(effect(&[term]).parameters.len(), 1);
+        for term in terms() {
+            let effect = effect(&[term]);
+            assert_eq!(effect.parameters.len(), 1 + effect.states.len());
         }
     }
 

@@ -36,4 +36,4 @@ pub use self::screen::screen;
 pub use self::search::{Round, Selected, Tried, select};
 pub(super) use self::search::{select_beginning_with, select_from};
 pub(super) use self::simpler::parts;
-pub(super) use self::trial::Trial;
+pub(super) use self::trial::{Trial, is_consistent};

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::base::{Base, base_parameters};
 use super::body::{Joint, Tree};
 use super::equations::{Column, Kind, Lengths, christoffel, columns};
-use super::formula::{factors, join, number, sum};
+use super::formula::{Weighed, factors, join, number, sum};
 use super::model_file::{gravity_parameter, name, parameter, short};
 use super::series::Series;
 use crate::data;
@@ -93,16 +93,16 @@ impl<'c> ClosedForm<'c> {
         let mut text = "\n[dynamics.let]\n".to_owned();
         for (i, j) in (0..n).flat_map(|i| (i..n).map(move |j| (i, j))) {
             if self.moves_together(i, j) {
-                let entry = self.sum(|base| base.column.mass[i][j].clone());
+                let entry = self.sum(&[i, j], 0, |base| base.column.mass[i][j].clone());
                 text += &entry_line(&mass_name(i, j), &entry);
             }
         }
         for i in (0..n).filter(|i| self.is_drawn(*i)) {
-            let slope = self.sum(|base| base.column.potential.derivative(i));
+            let slope = self.sum(&[i], 1, |base| base.column.potential.derivative(i));
             text += &entry_line(&format!("G{}", i + 1), &factors(&slope, "g"));
         }
         if self.has_gravity() {
-            let potential = self.sum(|base| base.column.potential.clone());
+            let potential = self.sum(&[], 1, |base| base.column.potential.clone());
             text += &entry_line("V", &factors(&potential, "g"));
         }
         let row = |i| {
@@ -149,9 +149,10 @@ impl<'c> ClosedForm<'c> {
         let n = self.joints();
         let mut text = String::new();
         for (j, k) in (0..n).flat_map(|j| (j..n).map(move |k| (j, k))) {
-            let symbol = self.sum(|Base { column, .. }| {
+            let of = [i, j, k];
+            let symbol = self.sum(&of, 0, |Base { column, .. }| {
                 let symbol = christoffel(&column.mass, i, j, k);
-                self.lengths.cleaned(column.kind, &[i, j, k], &symbol)
+                self.lengths.cleaned(column.kind, &of, &symbol)
             });
             if symbol != "0" {
                 join(&mut text, &factors(&symbol, &speeds(j, k)));
@@ -185,11 +186,15 @@ impl<'c> ClosedForm<'c> {
         )
     }
 
-    /// The sum over all parameters of a function of each.
-    fn sum(&self, function: impl Fn(&Base) -> Series) -> String {
-        let series: Vec<Series> = self.base.iter().map(function).collect();
+    /// The sum over all parameters of a function of each, in an equation of these joints and per this power of a length.
+    fn sum(&self, of: &[usize], per: i32, function: impl Fn(&Base) -> Series) -> String {
         let names = self.names.iter().map(String::as_str);
-        let terms: Vec<(&str, &Series)> = names.zip(&series).collect();
+        let weighed = |(base, name)| Weighed {
+            name,
+            series: function(base),
+            lengths: self.lengths.powers(base.column.kind, of) - per,
+        };
+        let terms: Vec<Weighed<'_>> = self.base.iter().zip(names).map(weighed).collect();
         sum(&terms)
     }
 }

@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::body::Joint;
-use super::series::{Series, Wave};
+use super::series::Series;
 use super::spatial::PARTS;
 use crate::data;
 
@@ -311,13 +311,17 @@ impl Lengths {
 
     /// A coefficient of a parameter in an equation of these joints, without rounding errors.
     pub fn cleaned(&self, kind: Kind, of: &[usize], series: &Series) -> Series {
-        let sliding = of.iter().filter(|joint| self.slides[**joint]).count();
-        self.with_powers(kind.lengths() - small(sliding), series)
+        self.with_powers(self.powers(kind, of), series)
+    }
+
+    /// The power of length in the unit of a parameter's coefficient in an equation of these joints.
+    pub fn powers(&self, kind: Kind, of: &[usize]) -> i32 {
+        let sliding = of.iter().map(|joint| i32::from(self.slides[*joint]));
+        kind.lengths() - sliding.sum::<i32>()
     }
 
     fn with_powers(&self, lengths: i32, series: &Series) -> Series {
-        let powers = |wave: &Wave| small(wave.powers.iter().map(|p| usize::from(*p)).sum());
-        series.cleaned(|wave| self.length.powi(lengths - powers(wave)))
+        series.cleaned(|wave| self.length.powi(lengths - wave.lengths()))
     }
 
     fn clean(&self, column: &mut Column) {
@@ -328,8 +332,4 @@ impl Lengths {
         }
         column.potential = self.with_powers(column.kind.lengths() - 1, &column.potential);
     }
-}
-
-fn small(count: usize) -> i32 {
-    i32::try_from(count).expect("a handful")
 }

@@ -3,11 +3,19 @@
 use super::series::{Series, Wave};
 use crate::data::Joint;
 
-/// A sum over parameters, each with its name and its coefficient.
-pub(super) fn sum(terms: &[(&str, &Series)]) -> String {
+/// A parameter with its coefficient.
+pub(super) struct Weighed<'t> {
+    pub name: &'t str,
+    pub series: Series,
+    /// The power of length in the coefficient's unit, to which coordinates of sliding joints contribute.
+    pub lengths: i32,
+}
+
+/// A sum over parameters.
+pub(super) fn sum(terms: &[Weighed<'_>]) -> String {
     let mut text = String::new();
-    for (name, series) in terms.iter().filter(|(_, series)| !series.is_zero()) {
-        join(&mut text, &product(name, series));
+    for term in terms.iter().filter(|term| !term.series.is_zero()) {
+        join(&mut text, &product(term));
     }
     if text.is_empty() { "0".into() } else { text }
 }
@@ -53,30 +61,32 @@ pub(super) fn number(value: f64) -> String {
     text.strip_suffix(".0").unwrap_or(&text).into()
 }
 
-/// A parameter times a function.
-fn product(name: &str, series: &Series) -> String {
-    let terms: Vec<(&Wave, f64)> = series.terms().collect();
+/// A parameter times a function. A number that stands for a length is written even if it is one, as it has a unit.
+fn product(term: &Weighed<'_>) -> String {
+    let name = term.name;
+    let is_length = |wave: &Wave| term.lengths != wave.lengths();
+    let terms: Vec<(&Wave, f64)> = term.series.terms().collect();
     if let [(wave, factor)] = terms[..] {
-        return scaled(
-            factor,
-            &[&[name.to_owned()], wave_factors(wave).as_slice()].concat(),
-        );
+        let factors = [&[name.to_owned()], wave_factors(wave).as_slice()].concat();
+        return scaled(factor, factors, is_length(wave));
     }
     let mut inner = String::new();
     for (wave, factor) in terms {
-        join(&mut inner, &scaled(factor, &wave_factors(wave)));
+        join(
+            &mut inner,
+            &scaled(factor, wave_factors(wave), is_length(wave)),
+        );
     }
     format!("{name}*({inner})")
 }
 
-fn scaled(factor: f64, factors: &[String]) -> String {
+fn scaled(factor: f64, mut factors: Vec<String>, has_unit: bool) -> String {
     let sign = if factor < 0.0 { "-" } else { "" };
     let size = number(factor.abs());
-    let mut parts = factors.to_vec();
-    if size != "1" || parts.is_empty() {
-        parts.insert(0, size);
+    if size != "1" || has_unit || factors.is_empty() {
+        factors.insert(0, size);
     }
-    format!("{sign}{}", parts.join("*"))
+    format!("{sign}{}", factors.join("*"))
 }
 
 /// `q1^2`, `cos(q2 + q3)`.
@@ -95,7 +105,10 @@ fn wave_factors(wave: &Wave) -> Vec<String> {
         .enumerate()
         .filter(|(_, times)| **times != 0)
     {
-        join(&mut angle, &scaled(f64::from(*times), &[coordinate(j)]));
+        join(
+            &mut angle,
+            &scaled(f64::from(*times), vec![coordinate(j)], false),
+        );
     }
     if !angle.is_empty() {
         factors.push(format!(
@@ -109,24 +122,30 @@ fn wave_factors(wave: &Wave) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::super::series::Series;
-    use super::{factors, number, sum};
+    use super::{Weighed, factors, number, sum};
 
     #[test]
     fn sums_print_in_conventional_form() {
         let (c1, c2, s2) = (Series::cos(0), Series::cos(1), Series::sin(1));
         let folded = &(&c1 * &c2) * -0.5;
         let mixed = &(&Series::coordinate(2) * &s2) - &Series::constant(3.0);
+        let weighed = |name, series, lengths| Weighed {
+            name,
+            series,
+            lengths,
+        };
         let text = sum(&[
-            ("a", &Series::constant(1.0)),
-            ("b", &folded),
-            ("c", &mixed),
-            ("d", &(&c1 * -1.0)),
+            weighed("a", Series::constant(1.0), 0),
+            weighed("b", folded, 0),
+            weighed("c", mixed, 1),
+            weighed("d", &c1 * -1.0, 0),
+            weighed("e", c2, 1),
         ]);
         assert_eq!(
             text,
-            "a + b*(-0.25*cos(q1 - q2) - 0.25*cos(q1 + q2)) + c*(-3 + q3*sin(q2)) - d*cos(q1)"
+            "a + b*(-0.25*cos(q1 - q2) - 0.25*cos(q1 + q2)) + c*(-3 + q3*sin(q2)) - d*cos(q1) + 1*e*cos(q2)"
         );
-        assert_eq!(sum(&[("a", &Series::default())]), "0");
+        assert_eq!(sum(&[weighed("a", Series::default(), 0)]), "0");
         assert_eq!(factors("a*(b + c)", "d"), "a*(b + c)*d");
         assert_eq!(factors("a*(b + c) - e", "d"), "(a*(b + c) - e)*d");
         assert_eq!(factors("-a", "d"), "-a*d");

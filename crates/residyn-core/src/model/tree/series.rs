@@ -19,6 +19,13 @@ pub(super) struct Wave {
     pub is_sine: bool,
 }
 
+impl Wave {
+    /// The power of length in its unit, which is that of its coordinates.
+    pub fn lengths(&self) -> i32 {
+        self.powers.iter().map(|power| i32::from(*power)).sum()
+    }
+}
+
 /// A linear combination of basis functions.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Series {
