@@ -65,7 +65,8 @@ pub(super) fn shares_of_gravity(problem: &Problem<'_>) -> Vec<Option<f64>> {
 }
 
 /// The share of the declared gravity in the torques, by least squares together with acceleration, friction and an
-/// offset, joint by joint, each weighted by the variance of its gravity; `None` if gravity hardly loads any joint.
+/// offset, joint by joint, each weighted by the variance of its gravity; `None` if gravity hardly loads any joint. A spring or
+/// a cable on a joint may look like a part of its gravity, or hide it: what remains beside one counts if it is nearer to all.
 fn share(bodies: &Model, smooth: &Smooth, settings: &NoteSettings) -> Option<f64> {
     let balance = bodies.torque_balance()?;
     let (n, rows) = (bodies.joints, smooth.rows());
@@ -96,13 +97,79 @@ fn share(bodies: &Model, smooth: &Smooth, settings: &NoteSettings) -> Option<f64
             column(&|row| smooth.qd[j][row]),
             column(&|row| smooth.qd[j][row].signum()),
             column(&|_| 1.0),
+            column(&|row| smooth.q[j][row]),
         ];
-        let columns = DMatrix::from_columns(&columns);
-        let found = least_squares(columns, &torque, 1e-9)?;
-        Some((varies, found[0]))
+        let held = |columns: &[DVector<f64>]| {
+            let found = least_squares(DMatrix::from_columns(columns), &torque, 1e-9)?;
+            Some(found[0])
+        };
+        let (alone, beside_spring) = (held(&columns[..5])?, held(&columns)?);
+        let is_nearer = (beside_spring - 1.0).abs() < (alone - 1.0).abs();
+        Some((varies, if is_nearer { beside_spring } else { alone }))
     };
     let message: Vec<(f64, f64)> = (0..n).filter_map(of_joint).collect();
     let all: f64 = message.iter().map(|(varies, _)| varies).sum();
     let held: f64 = message.iter().map(|(varies, share)| varies * share).sum();
     (all > 0.0).then(|| held / all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::share;
+    use crate::closeloop::Settings;
+    use crate::data::Smooth;
+    use crate::model::Library;
+    use crate::sim::metric::balance_of;
+
+    /// The share of gravity in torques that are those of the motion, less gravity if it is compensated for elsewhere, and with a
+    /// spring on the last joint.
+    fn found(carries_gravity: bool, stiffness: f64) -> f64 {
+        let model = Library::built_in().model("acrobot").unwrap();
+        let balance = model.torque_balance().unwrap();
+        let time: Vec<f64> = (0..2000).map(|row| 0.005 * f64::from(row)).collect();
+        let of = |wave: fn(f64) -> f64, power: i32| -> Vec<Vec<f64>> {
+            let at = |t: &f64, w: f64| w.powi(power) * wave(w * t);
+            let joint = |w: f64| {
+                time.iter()
+                    .map(|t| at(t, w) + 0.3 * at(t, 2.7 * w))
+                    .collect()
+            };
+            vec![joint(1.1), joint(1.7)]
+        };
+        let none = vec![vec![0.0; time.len()]; 2];
+        let mut smooth = Smooth {
+            q: of(f64::sin, 0),
+            qd: of(f64::cos, 1),
+            qdd: of(|x| -x.sin(), 2),
+            tau: none.clone(),
+            measured: Vec::new(),
+            directions: Vec::new(),
+            rests: vec![vec![false; time.len()]; 2],
+            time,
+        };
+        let at_rest = Smooth {
+            qd: none.clone(),
+            qdd: none,
+            ..smooth.clone()
+        };
+        let [moving, gravity] = [&smooth, &at_rest].map(|of| balance_of(&balance, of, &[]));
+        let held = if carries_gravity { 0.0 } else { 1.0 };
+        for (j, spring) in [0.0, stiffness].into_iter().enumerate() {
+            for row in 0..smooth.rows() {
+                let rest = moving[j][row] - held * gravity[j][row];
+                smooth.tau[j][row] = rest + spring * (smooth.q[j][row] - 0.2);
+            }
+        }
+        share(&model, &smooth, &Settings::default().notes).unwrap()
+    }
+
+    #[test]
+    fn a_spring_is_not_taken_for_another_gravity() {
+        for stiffness in [0.0, 8.0, -8.0] {
+            let with = found(true, stiffness);
+            assert!((with - 1.0).abs() < 0.1, "{stiffness}: {with}");
+            let without = found(false, stiffness);
+            assert!(without.abs() < 0.4, "{stiffness}: {without}");
+        }
+    }
 }
