@@ -65,11 +65,12 @@ fn known(library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
 }
 
 /// Memory and sensors are not part of the equations of motion.
-const NOT_IN_THE_EQUATIONS: [&str; 6] = [
+const NOT_IN_THE_EQUATIONS: [&str; 7] = [
     "actuator_delay",
     "actuator_lag",
     "backlash",
     "encoder_eccentricity",
+    "joint_compliance",
     "sensor_offset",
     "parameter_shift",
 ];

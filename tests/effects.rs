@@ -333,6 +333,7 @@ fn every_effect_file_is_tested_here() {
         "actuator_delay",
         "actuator_lag",
         "backlash",
+        "joint_compliance",
         "presliding",
         "lugre_friction",
         "thermal_friction",

@@ -346,6 +346,7 @@ mod slow {
             ("actuator_lag", 0.02),
             ("backlash", 0.01),
             ("encoder_eccentricity", 0.01),
+            ("joint_compliance", 0.01),
         ] {
             let scratch = Scratch::new();
             let plant = format!("pendulum --duration 15 --effect {name}={truth}");

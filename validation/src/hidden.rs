@@ -143,6 +143,7 @@ impl Machine {
             "actuator_delay" => drive.delay = n("d")?,
             "actuator_lag" => drive.lag = n("T")?,
             "backlash" => self.transmissions[j] = Some(Transmission::backlash(n("delta")?)),
+            "joint_compliance" => self.transmissions[j] = Some(Transmission::giving(n("c")?)),
             name @ ("joint_elasticity" | "motor_backlash") => {
                 if n("friction")? > 0.0 {
                     return Err(format!(

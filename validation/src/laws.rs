@@ -33,6 +33,10 @@ pub const SMOOTH: &[Entry] = &[
     ("quadratic_drag", &["c"], |n, at| -n[0] * at.v * at.v.abs()),
     ("cubic_damping", &["c"], |n, at| -n[0] * at.v * at.v * at.v),
     ("joint_spring", &["k", "q_0"], |n, at| -n[0] * (at.q - n[1])),
+    ("stiffening_spring", &["k", "q_0", "k_c"], |n, at| {
+        let bend = at.q - n[1];
+        -bend * (n[0] + n[2] * bend * bend)
+    }),
     ("constant_torque", &["tau_0"], |n, _| n[0]),
     ("cogging_torque", &["A", "N", "phase"], ripple),
     ("fractional_ripple", &["A", "N", "phase"], ripple),
@@ -153,6 +157,7 @@ mod tests {
             ("quadratic_drag", &[0.5], back, 2.0),
             ("cubic_damping", &[0.5], back, 4.0),
             ("joint_spring", &[2.0, 0.5], fast, 0.4),
+            ("stiffening_spring", &[2.0, 0.5, 10.0], fast, 0.48),
             ("constant_torque", &[0.1], fast, 0.1),
             (
                 "cogging_torque",

@@ -23,6 +23,11 @@ const DAMPING_RATIO: f64 = 0.3;
 /// Reflected rotor inertia of a small geared motor.
 const ROTOR_INERTIA: f64 = 0.002;
 
+/// The damping of a motor on a spring \[N m s/rad\].
+fn damping(stiffness: f64, inertia: f64) -> f64 {
+    2.0 * DAMPING_RATIO * (stiffness * inertia).sqrt()
+}
+
 impl Transmission {
     /// Two-sided play of `play` rad behind a small motor.
     pub fn backlash(play: f64) -> Self {
@@ -32,12 +37,25 @@ impl Transmission {
         }
     }
 
+    /// A shaft that gives by `compliance` rad/(N m) behind a small motor.
+    pub fn giving(compliance: f64) -> Self {
+        let stiffness = 1.0 / compliance;
+        Self {
+            play: 0.0,
+            stiffness,
+            damping: damping(stiffness, ROTOR_INERTIA),
+            inertia: ROTOR_INERTIA,
+            has_encoder: true,
+            is_lumped: true,
+        }
+    }
+
     /// Two-sided play of `play` rad behind a motor of this inertia.
     pub fn with_play(play: f64, inertia: f64, has_encoder: bool) -> Self {
         Self {
             play,
             stiffness: CONTACT_STIFFNESS,
-            damping: 2.0 * DAMPING_RATIO * (CONTACT_STIFFNESS * inertia).sqrt(),
+            damping: damping(CONTACT_STIFFNESS, inertia),
             inertia,
             has_encoder,
             is_lumped: false,

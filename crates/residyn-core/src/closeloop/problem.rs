@@ -36,6 +36,8 @@ pub struct Problem<'a> {
     pub top_speed: Vec<f64>,
     pub top_torque: Vec<f64>,
     pub top_driving: Vec<f64>,
+    /// From each joint's lowest angle in the logs to its highest, rad or m.
+    pub travel: Vec<f64>,
     /// What the declared equations give each joint, kg m^2 or kg, worked out on first use: of many joints it takes long, and
     /// few effects ask.
     pub(super) inertias: Arc<OnceLock<Vec<f64>>>,
@@ -114,6 +116,13 @@ impl<'a> Problem<'a> {
         let largest = |channel: &[f64]| channel.iter().fold(0.0, |top: f64, x| top.max(x.abs()));
         let top_torque = top(&|l, j| largest(&torques[l][j]));
         let top_driving = top(&|l, j| largest(&logs[l].tau[j]));
+        let travel = |j: usize| {
+            let angles = || audits.iter().map(|audit| &audit.joints[j].q);
+            let highest = angles().map(|q| q.max).fold(f64::NEG_INFINITY, f64::max);
+            let lowest = angles().map(|q| q.min).fold(f64::INFINITY, f64::min);
+            highest - lowest
+        };
+        let travel = (0..declared.joints).map(travel).collect();
         // Encoders finer than their noise show it; coarse ones add quantisation error.
         let noise = top(&|l, j| {
             let channel = &audits[l].joints[j].q;
@@ -146,6 +155,7 @@ impl<'a> Problem<'a> {
             top_speed,
             top_torque,
             top_driving,
+            travel,
             inertias: Arc::default(),
             first: None,
             usual: Arc::default(),
@@ -183,6 +193,7 @@ impl<'a> Problem<'a> {
             top_torque: self.top_torque[joint],
             inertia: &|| self.inertias.get_or_init(|| self.declared.joint_inertias())[joint],
             duration_s: durations.fold(0.0, f64::max),
+            travel: self.travel[joint],
         });
         match &self.declared.sides {
             Some(sides) => measured.read_on(sides[joint]),

@@ -1,4 +1,5 @@
 use std::collections::BTreeSet;
+use std::f64::consts::TAU;
 
 use super::assemble::lower;
 use super::error::ModelError;
@@ -227,6 +228,8 @@ pub struct Logged<'a> {
     pub inertia: &'a dyn Fn() -> f64,
     /// The length of the longest log, s.
     pub duration_s: f64,
+    /// From the lowest angle to the highest, rad or m.
+    pub travel: f64,
 }
 
 /// A parameter of an effect.
@@ -426,7 +429,8 @@ impl Effect {
     }
 
     /// The same effect with bounds and starting values in the parameters' own units, for a joint in its logs. Dry friction
-    /// has no other shape within its reversal: no speed at which it changes is lower.
+    /// has no other shape within its reversal: no speed at which it changes is lower. What repeats with each turn is seen to
+    /// repeat: less than one period of it has the shape of a spring, or of any other force that bends.
     #[must_use]
     pub fn measured_by(&self, logged: &Logged<'_>) -> Self {
         let is_dry = (self.entry.formula()).is_some_and(|formula| formula.calls("sign"));
@@ -447,6 +451,11 @@ impl Effect {
                 *low = low.max(least).min(*high);
                 // A start at the bound would be the shape of the reversal itself.
                 parameter.starts.retain(|start| start > low);
+            }
+            if parameter.counts_periods() {
+                parameter
+                    .starts
+                    .retain(|start| start * logged.travel >= TAU);
             }
         }
         effect
@@ -597,6 +606,11 @@ impl EffectParameter {
     pub fn is_switch(&self) -> bool {
         self.starts == [0.0]
     }
+
+    /// Whether it is a number of periods per turn.
+    fn counts_periods(&self) -> bool {
+        self.whole && self.unit == "1/rad"
+    }
 }
 
 /// Whether each torque is larger than the one before.
@@ -606,6 +620,8 @@ fn grows(torques: &[f64]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::Logged;
     use crate::model::Library;
 
@@ -697,6 +713,7 @@ mod tests {
                 top_torque: 1.0,
                 inertia: &|| 0.1,
                 duration_s: 20.0,
+                travel: 1.0,
             });
             let mut parameters = measured.parameters.into_iter();
             let speed = parameters.find(|own| own.name == parameter).unwrap();
@@ -708,5 +725,29 @@ mod tests {
         assert_eq!(stribeck(20.0), ([10.0, 10.0], vec![]));
         let degressive = |reversal: f64| speed("degressive_friction", "v_d", reversal);
         assert_eq!(degressive(0.7), degressive(0.0));
+    }
+
+    #[test]
+    fn a_ripple_is_looked_for_where_a_whole_period_of_it_was_seen() {
+        let library = Library::built_in();
+        let first = |effect: &str, travel: f64| {
+            let effect = library.effect(effect).unwrap();
+            let measured = effect.measured_by(&Logged {
+                reversal: 0.0,
+                top_speed: 1.0,
+                top_torque: 1.0,
+                inertia: &|| 1.0,
+                duration_s: 1.0,
+                travel,
+            });
+            let mut periods = measured.parameters.into_iter();
+            let periods = periods.find(|own| own.name == "N").unwrap().starts;
+            periods.first().copied()
+        };
+        for effect in ["cogging_torque", "gear_ripple"] {
+            assert_eq!(first(effect, TAU), Some(2.0));
+            assert_eq!(first(effect, 1.0), Some(7.0));
+            assert_eq!(first(effect, 0.1), None);
+        }
     }
 }
