@@ -566,7 +566,7 @@ mod slow {
             // No spring winds up over turns: an apparent one is an angle in degrees. A position loop, whose targets are taken for
             // torques here, is a spring.
             let turns = log.q.iter().flatten().any(|q| q.abs() > TAU);
-            let has_spring = ["spring", "cable_hysteresis", "servo"];
+            let has_spring = ["joint_spring", "cable_hysteresis", "servo"];
             let is_wound = turns && has_spring.iter().any(|spring| case.name.contains(spring));
             // A motor on a soft spring swings against torques that are slower than its resonance.
             let swings = case.name.contains("joint_elasticity");

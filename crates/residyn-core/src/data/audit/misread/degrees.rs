@@ -16,6 +16,10 @@ const MUCH_BETTER: f64 = 1.0 / 3.0;
 /// and to explain this much more of their variance: the last percent is a matter of friction, not of gravity.
 const MUCH_MORE: f64 = 0.1;
 
+/// No spring is bent by more than a turn to either side \[rad\]. Within that, gravity on so few degrees is a straight line,
+/// as a spring is: nothing tells one from the other.
+const BEYOND_SPRINGS: f64 = 2.0 * TAU;
+
 /// rad
 const DEGREE: f64 = TAU / 360.0;
 
@@ -57,9 +61,12 @@ struct Judged<'a> {
 impl Judged<'_> {
     fn is_beyond_doubt(&self) -> bool {
         let Self {
-            radians, degrees, ..
+            audit,
+            radians,
+            degrees,
         } = *self;
-        degrees < MUCH_BETTER * radians && degrees < radians - MUCH_MORE
+        let is_better = degrees < MUCH_BETTER * radians && degrees < radians - MUCH_MORE;
+        is_better && audit.q.range() > BEYOND_SPRINGS
     }
 
     fn misread(&self) -> Misread {
