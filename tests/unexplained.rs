@@ -132,29 +132,31 @@ qdd1 = "20*(tau1 - k*(q1 - q2) - 0.02*(qd1 - qd2))"
 qdd2 = "6*(k*(q1 - q2) + 0.02*(qd1 - qd2)) - 17.4*sin(q2)"
 "#;
 
-/// A bristle that bends before the joint slides (Dahl 1968): its deflection is modelled as the second joint's velocity.
-const PRESLIDING: &str = r#"
+/// A force of `k` times a state that moves at `rate`, modelled as the velocity of a second joint.
+fn remembering(k: f64, rate: &str) -> String {
+    format!(
+        r#"
 [system]
-name = "presliding"
+name = "remembering"
 joints = 2
 [parameters]
-k = { value = 4.0, unit = "N m/rad" }
+k = {{ value = {k:?} }}
 [dynamics]
 qdd1 = "-17.4*sin(q1) + 4.6*(tau1 - k*qd2)"
-qdd2 = "qd1 - 20*abs(qd1)*qd2"
-"#;
+qdd2 = "{rate}"
+"#
+    )
+}
 
-/// A damper in series with a spring: it feels what the speed was, modelled as the second joint's velocity.
-const YIELDING: &str = r#"
-[system]
-name = "yielding"
-joints = 2
-[parameters]
-k = { value = 0.4, unit = "N m s/rad" }
-[dynamics]
-qdd1 = "-17.4*sin(q1) + 4.6*(tau1 - k*qd2)"
-qdd2 = "(qd1 - qd2) / 0.3"
-"#;
+/// A bristle that bends before the joint slides (Dahl 1968): 4 N m/rad times its deflection.
+fn presliding() -> String {
+    remembering(4.0, "qd1 - 20*abs(qd1)*qd2")
+}
+
+/// A damper in series with a spring: it feels what the speed was, 0.4 N m s/rad of it.
+fn yielding() -> String {
+    remembering(0.4, "(qd1 - qd2) / 0.3")
+}
 
 /// Logs of the first of two joints.
 fn logs_of_first(model: &str, seed: u64) -> Vec<Log> {
@@ -188,8 +190,8 @@ fn logs_of_first(model: &str, seed: u64) -> Vec<Log> {
 /// addition to the effects that come nearest.
 #[test]
 fn effects_with_internal_state_are_not_taken_for_noise() {
-    for model in [COMPLIANT, PRESLIDING] {
-        let logs = logs_of_first(model, 1);
+    for model in [COMPLIANT.to_owned(), presliding()] {
+        let logs = logs_of_first(&model, 1);
         for effects in [&[][..], &["viscous_friction", "coulomb_friction"]] {
             let left = left(&logs, effects, 1);
             assert!(
@@ -203,10 +205,10 @@ fn effects_with_internal_state_are_not_taken_for_noise() {
 #[test]
 fn a_force_with_a_memory_is_proposed_with_the_rate_of_its_state() {
     for (model, rate, size, scale) in [
-        (YIELDING, "dw1/dt = (qd1 - w1) / ", 0.4, 0.3),
-        (PRESLIDING, "dw1/dt = (qd1 - abs(qd1) * w1) / ", 0.2, 0.05),
+        (yielding(), "dw1/dt = (qd1 - w1) / ", 0.4, 0.3),
+        (presliding(), "dw1/dt = (qd1 - abs(qd1) * w1) / ", 0.2, 0.05),
     ] {
-        let found = proposed(&logs_of_first(model, 1), 1).unwrap();
+        let found = proposed(&logs_of_first(&model, 1), 1).unwrap();
         assert!(found.formula.contains(rate), "{found:?}");
         assert!(found.explains > 0.8, "{found:?}");
         let library = library(std::slice::from_ref(&found.file));

@@ -41,12 +41,9 @@ impl Transmission {
     pub fn giving(compliance: f64) -> Self {
         let stiffness = 1.0 / compliance;
         Self {
-            play: 0.0,
             stiffness,
             damping: damping(stiffness, ROTOR_INERTIA),
-            inertia: ROTOR_INERTIA,
-            has_encoder: true,
-            is_lumped: true,
+            ..Self::backlash(0.0)
         }
     }
 

@@ -66,7 +66,8 @@ pub(super) fn shares_of_gravity(problem: &Problem<'_>) -> Vec<Option<f64>> {
 
 /// The share of the declared gravity in the torques, by least squares together with acceleration, friction and an
 /// offset, joint by joint, each weighted by the variance of its gravity; `None` if gravity hardly loads any joint. A spring or
-/// a cable on a joint may look like a part of its gravity, or hide it: what remains beside one counts if it is nearer to all.
+/// a cable on a joint may look like a part of its gravity, or hide it: the share beside one counts if it is nearer to
+/// the whole.
 fn share(bodies: &Model, smooth: &Smooth, settings: &NoteSettings) -> Option<f64> {
     let balance = bodies.torque_balance()?;
     let (n, rows) = (bodies.joints, smooth.rows());
@@ -153,10 +154,10 @@ mod tests {
             ..smooth.clone()
         };
         let [moving, gravity] = [&smooth, &at_rest].map(|of| balance_of(&balance, of, &[]));
-        let held = if carries_gravity { 0.0 } else { 1.0 };
+        let missing = if carries_gravity { 0.0 } else { 1.0 };
         for (j, spring) in [0.0, stiffness].into_iter().enumerate() {
             for row in 0..smooth.rows() {
-                let rest = moving[j][row] - held * gravity[j][row];
+                let rest = moving[j][row] - missing * gravity[j][row];
                 smooth.tau[j][row] = rest + spring * (smooth.q[j][row] - 0.2);
             }
         }

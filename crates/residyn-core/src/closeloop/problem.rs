@@ -6,6 +6,7 @@ use super::fitted::Fitted;
 use super::settings::Settings;
 use super::smoothing::width;
 use super::split::by_numbers;
+use crate::data::statistics::ends;
 use crate::data::{Audit, Joint, JointAudit, Log, audit};
 use crate::identify::{
     Fit, FitError, Identifiability, LevenbergMarquardt, Shooting, Solver, Values, cut, fit_below,
@@ -117,9 +118,9 @@ impl<'a> Problem<'a> {
         let top_torque = top(&|l, j| largest(&torques[l][j]));
         let top_driving = top(&|l, j| largest(&logs[l].tau[j]));
         let travel = |j: usize| {
-            let angles = || audits.iter().map(|audit| &audit.joints[j].q);
-            let highest = angles().map(|q| q.max).fold(f64::NEG_INFINITY, f64::max);
-            let lowest = angles().map(|q| q.min).fold(f64::INFINITY, f64::min);
+            let angles = audits.iter().map(|audit| &audit.joints[j].q);
+            let extremes: Vec<f64> = angles.flat_map(|q| [q.min, q.max]).collect();
+            let [lowest, highest] = ends(&extremes);
             highest - lowest
         };
         let travel = (0..declared.joints).map(travel).collect();

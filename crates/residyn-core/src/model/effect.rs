@@ -622,7 +622,7 @@ fn grows(torques: &[f64]) -> bool {
 mod tests {
     use std::f64::consts::TAU;
 
-    use super::Logged;
+    use super::{EffectParameter, Logged};
     use crate::model::Library;
 
     /// The variable of a built-in effect, and its force there with the derivatives with respect to the parameters.
@@ -702,21 +702,26 @@ mod tests {
         }
     }
 
+    /// A parameter of a built-in effect for a joint with this reversal and travel, in other respects always the same.
+    fn measured(effect: &str, parameter: &str, reversal: f64, travel: f64) -> EffectParameter {
+        let library = Library::built_in();
+        let effect = library.effect(effect).unwrap();
+        let measured = effect.measured_by(&Logged {
+            reversal,
+            top_speed: 10.0,
+            top_torque: 1.0,
+            inertia: &|| 0.1,
+            duration_s: 20.0,
+            travel,
+        });
+        let mut parameters = measured.parameters.into_iter();
+        parameters.find(|own| own.name == parameter).unwrap()
+    }
+
     #[test]
     fn dry_friction_changes_at_no_speed_within_its_reversal() {
-        let library = Library::built_in();
         let speed = |effect: &str, parameter: &str, reversal: f64| {
-            let effect = library.effect(effect).unwrap();
-            let measured = effect.measured_by(&Logged {
-                reversal,
-                top_speed: 10.0,
-                top_torque: 1.0,
-                inertia: &|| 0.1,
-                duration_s: 20.0,
-                travel: 1.0,
-            });
-            let mut parameters = measured.parameters.into_iter();
-            let speed = parameters.find(|own| own.name == parameter).unwrap();
+            let speed = measured(effect, parameter, reversal, 1.0);
             (speed.bounds, speed.starts)
         };
         let stribeck = |reversal: f64| speed("stribeck_friction", "v_s", reversal);
@@ -729,25 +734,11 @@ mod tests {
 
     #[test]
     fn a_ripple_is_looked_for_where_a_whole_period_of_it_was_seen() {
-        let library = Library::built_in();
-        let first = |effect: &str, travel: f64| {
-            let effect = library.effect(effect).unwrap();
-            let measured = effect.measured_by(&Logged {
-                reversal: 0.0,
-                top_speed: 1.0,
-                top_torque: 1.0,
-                inertia: &|| 1.0,
-                duration_s: 1.0,
-                travel,
-            });
-            let mut periods = measured.parameters.into_iter();
-            let periods = periods.find(|own| own.name == "N").unwrap().starts;
-            periods.first().copied()
-        };
         for effect in ["cogging_torque", "gear_ripple"] {
-            assert_eq!(first(effect, TAU), Some(2.0));
-            assert_eq!(first(effect, 1.0), Some(7.0));
-            assert_eq!(first(effect, 0.1), None);
+            let first = |travel: f64| measured(effect, "N", 0.0, travel).starts.first().copied();
+            assert_eq!(first(TAU), Some(2.0));
+            assert_eq!(first(1.0), Some(7.0));
+            assert_eq!(first(0.1), None);
         }
     }
 }
