@@ -556,64 +556,45 @@ impl<'t> TangentStepper<'t> {
     ) {
         // With the number of joints known at compile time, the loops over rows are unrolled.
         match (self.tangent.joints, self.tangent.layout.internal().len()) {
-            (1, 0) => self.stage_of(simd, [1, 0], is_first, is_last, weighed, reached),
-            (2, 0) => self.stage_of(simd, [2, 0], is_first, is_last, weighed, reached),
-            (n, 0) => self.stage_of(simd, [n, 0], is_first, is_last, weighed, reached),
-            (n, m) => self.stage_of(simd, [n, m], is_first, is_last, weighed, reached),
+            (1, 0) => self.stage_of(simd, 1, is_first, is_last, weighed, reached),
+            (2, 0) => self.stage_of(simd, 2, is_first, is_last, weighed, reached),
+            (n, 0) => self.stage_of(simd, n, is_first, is_last, weighed, reached),
+            _ => self.stage_with_memory(simd, is_first, is_last, weighed, reached),
         }
     }
 
+    /// The stage of a model without internal states.
     #[inline(always)]
     fn stage_of<S: Simd>(
         &mut self,
         simd: S,
-        [n, internal]: [usize; 2],
+        n: usize,
         is_first: bool,
         is_last: bool,
         weighed: &Lane,
         reached: &Lane,
     ) {
-        let rows = 2 * n + internal;
+        let rows = 2 * n;
         let inner = if is_first { &self.now } else { &self.inner };
         let columns = (self.now.chunks_exact(rows))
             .zip(inner.chunks_exact(rows))
             .zip(self.next.chunks_exact_mut(rows))
             .zip(self.sum.chunks_exact_mut(rows));
         let by_state = &self.by_state[..n * rows];
-        let has_jumps = internal > 0 && self.tangent.has_jumps();
         for (column, (((now, inner), next), sum)) in columns.enumerate() {
             let direct = self.tangent.direct(column);
             for part in 0..Lane::parts::<S>() {
                 let (weighed, reached) = (weighed.get(simd, part), reached.get(simd, part));
                 for row in 0..rows {
-                    // Among the slopes: jumps are the last.
-                    let place = if row < n { rows + row } else { row } - n;
-                    let own = |first: usize| self.tape.output(first + place).get(simd, part);
                     let mut slope = match (row < n, direct) {
-                        (true, Some(first)) if has_jumps => {
-                            inner[n + row].get(simd, part) + own(first)
-                        }
                         (true, _) => inner[n + row].get(simd, part),
-                        (false, Some(first)) => own(first),
+                        (false, Some(first)) => self.tape.output(first + row - n).get(simd, part),
                         (false, None) => weighed.like(0.0),
                     };
-                    if row >= n || has_jumps {
-                        if column > 0 && place < n {
-                            for state in 0..rows {
-                                let by_state = by_state[place * rows + state].get(simd, part);
-                                slope = by_state.mul_add(inner[state].get(simd, part), slope);
-                            }
-                        } else if column > 0 {
-                            for (state, output) in &self.tangent.rates_by_state[place - n] {
-                                let by = self.tape.output(*output).get(simd, part);
-                                slope = by.mul_add(inner[*state].get(simd, part), slope);
-                            }
-                        }
-                        if column > 0 && internal > 0 {
-                            for (state, output) in &self.tangent.by_start[place] {
-                                let by = self.tape.output(*output).get(simd, part);
-                                slope = by.mul_add(now[*state].get(simd, part), slope);
-                            }
+                    if row >= n && column > 0 {
+                        for state in 0..rows {
+                            let by_state = by_state[(row - n) * rows + state].get(simd, part);
+                            slope = by_state.mul_add(inner[state].get(simd, part), slope);
                         }
                     }
                     let now = now[row].get(simd, part);
@@ -629,6 +610,85 @@ impl<'t> TangentStepper<'t> {
                 }
             }
         }
+    }
+
+    /// The stage of a model with internal states, most of whose derivatives are zero: only the others are met, each for
+    /// all registers of a row in turn.
+    #[inline(always)]
+    fn stage_with_memory<S: Simd>(
+        &mut self,
+        simd: S,
+        is_first: bool,
+        is_last: bool,
+        weighed: &Lane,
+        reached: &Lane,
+    ) {
+        let Self { tangent, tape, .. } = self;
+        let (n, rows, has_jumps) = (tangent.joints, tangent.states(), tangent.has_jumps());
+        let inner = if is_first { &self.now } else { &self.inner };
+        let columns = (self.now.chunks_exact(rows))
+            .zip(inner.chunks_exact(rows))
+            .zip(self.next.chunks_exact_mut(rows))
+            .zip(self.sum.chunks_exact_mut(rows));
+        for (column, (((now, inner), next), sum)) in columns.enumerate() {
+            let direct = tangent.direct(column);
+            for row in 0..rows {
+                // Among the slopes: jumps are the last.
+                let place = if row < n { rows + row } else { row } - n;
+                let is_velocity = row < n;
+                let own = (direct.filter(|_| !is_velocity || has_jumps))
+                    .map(|first| tape.output(first + place));
+                let mut slope = match (is_velocity, own) {
+                    (true, _) => inner[n + row],
+                    (false, Some(own)) => *own,
+                    (false, None) => Row::splat(0.0),
+                };
+                if let (true, Some(jump)) = (is_velocity, own) {
+                    add(simd, &mut slope, jump);
+                }
+                if column > 0 && (!is_velocity || has_jumps) {
+                    if place < n {
+                        let by_state = &self.by_state[place * rows..][..rows];
+                        for (by, state) in by_state.iter().zip(inner) {
+                            add_product(simd, &mut slope, by, state);
+                        }
+                    } else {
+                        for (state, output) in &tangent.rates_by_state[place - n] {
+                            add_product(simd, &mut slope, tape.output(*output), &inner[*state]);
+                        }
+                    }
+                    for (state, output) in &tangent.by_start[place] {
+                        add_product(simd, &mut slope, tape.output(*output), &now[*state]);
+                    }
+                }
+                let before = if is_first { now[row] } else { sum[row] };
+                sum[row] = before;
+                add_product(simd, &mut sum[row], &slope, weighed);
+                if !is_last {
+                    next[row] = now[row];
+                    add_product(simd, &mut next[row], &slope, reached);
+                }
+            }
+        }
+    }
+}
+
+/// Add a row to another, register by register.
+#[inline(always)]
+fn add<S: Simd>(simd: S, sum: &mut Lane, own: &Lane) {
+    for part in 0..Lane::parts::<S>() {
+        sum.set(part, sum.get(simd, part) + own.get(simd, part));
+    }
+}
+
+/// Add the product of two rows to another, register by register.
+#[inline(always)]
+fn add_product<S: Simd>(simd: S, sum: &mut Lane, by: &Lane, of: &Lane) {
+    for part in 0..Lane::parts::<S>() {
+        let product = by
+            .get(simd, part)
+            .mul_add(of.get(simd, part), sum.get(simd, part));
+        sum.set(part, product);
     }
 }
 
