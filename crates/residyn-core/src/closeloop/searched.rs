@@ -45,7 +45,7 @@ impl<'a> Searched<'a> {
         watch.see(Stage::Diagnostics.into());
         let mut left = best.diagnose(rng);
         // Torques have no false minima.
-        if (left.is_significant() || best.chosen.failure.is_some())
+        if (best.leaves_much(&left) || best.chosen.failure.is_some())
             && !is_near
             && let Some(other) = best.searched_again(watch)
         {
@@ -144,6 +144,12 @@ impl<'a> Searched<'a> {
         let first = first.and_then(Result::ok);
         let other = Self::beginning_with(first, declared, watch);
         Ok((other.loss() < narrowest).then_some(other))
+    }
+
+    /// Whether so much is unexplained that the chosen set may be that of a false minimum.
+    fn leaves_much(&self, left: &Unexplained) -> bool {
+        let most = (self.declared.problem.settings.select).false_minimum_share;
+        left.is_significant() && left.fraction > most
     }
 
     /// A search that begins over short windows and from the declared values, if its loss is lower: with most of the

@@ -173,6 +173,9 @@ settings! {
         fitted_to_the_end: usize = 2,
         /// The search takes at most this many rounds of prediction and fits.
         most_rounds: usize = 8,
+        /// If more than this share of the declared model's residual variance above noise remains, fits may have ended in a
+        /// false minimum: another search begins over short windows, from the declared values.
+        false_minimum_share: f64 = 0.05,
         /// A round must lower the loss on left-out blocks by this share for another round to follow.
         round_gain: f64 = 0.02,
         /// A transmission is fitted to all windows if fits to a sample of them lower its cost by this share: half of what a
