@@ -44,7 +44,7 @@ impl Unused {
 /// The model without a transmission that is not established; or the one without one of the chosen effects, with the usual
 /// friction, with the effects that most machines have, or the declared one, if it predicts whole logs better than the chosen
 /// one: those left out of a fit of the others in turn, and those set `apart`, to which nothing is fitted. The search compares
-/// short windows of logs that it knows.
+/// short windows of logs that it knows. Or the one without an effect that does nothing, if there is none of these.
 pub(super) fn plainer(
     problem: &Problem<'_>,
     declared: &Fitted,
@@ -117,7 +117,10 @@ pub(super) fn plainer(
     let gains: Vec<Option<f64>> = others.par_iter().map(gain).collect();
     let better = others.iter().zip(gains);
     let better = better.filter_map(|(other, gain)| Some((other, gain?)));
-    let (best, gain) = better.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let best = better.max_by(|(_, a), (_, b)| a.total_cmp(b));
+    let Some((best, gain)) = best else {
+        return without_idle(problem, chosen);
+    };
     Some(Plainer {
         fitted: best.fitted.clone(),
         unused: Unused {
@@ -145,6 +148,22 @@ fn without_doubtful_body(chosen: &Chosen) -> Option<Plainer> {
                 why,
             },
         })
+    })
+}
+
+/// The model without the effect that does least, if the loss on left-out blocks hardly rises: beside effects that a plainer
+/// model no longer has, it did more.
+fn without_idle(problem: &Problem<'_>, chosen: &Chosen) -> Option<Plainer> {
+    let most = problem.settings.select.negligible_rise;
+    let idle = chosen.standings.iter();
+    let idle = idle.filter(|standing| standing.gain < most && standing.reason.is_some());
+    let least = idle.min_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    Some(Plainer {
+        fitted: least.without.clone().ok()?,
+        unused: Unused {
+            effect: Some(least.effect.clone()),
+            why: least.reason.clone()?,
+        },
     })
 }
 

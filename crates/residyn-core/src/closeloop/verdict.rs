@@ -1,5 +1,6 @@
 use super::diagnostics::{UNKNOWN, Unexplained};
 use super::error_model::ErrorModel;
+use super::establish::Chosen;
 use super::gravity::against_gravity;
 use super::judge::Found;
 use super::plainer::Unused;
@@ -56,15 +57,19 @@ fn concluded(found: &Found<'_>, refined: &Refined<'_>, errors: &Errors) -> (Verd
         .or_else(|| inconclusive(problem, &refined.identifiability, established))
     {
         Some(reason) => (Verdict::Inconclusive, reason),
-        None if added > 0 && are_worse => contradicted(established, &found.unexplained),
+        None if added > 0 && are_worse => contradicted(&found.chosen, &found.unexplained),
         None if found.chosen.stopped && established == 0 => {
             (Verdict::Inconclusive, format!("{STOPPED} than none"))
         }
         None if found.chosen.stopped => {
-            let (verdict, reason) = conclusion(established, &found.unexplained);
+            let (verdict, reason) = conclusion(&found.chosen, &found.unexplained);
             (verdict, format!("{reason}; {STOPPED}"))
         }
-        None => above_noise(conclusion(established, &found.unexplained), problem, errors),
+        None => above_noise(
+            conclusion(&found.chosen, &found.unexplained),
+            problem,
+            errors,
+        ),
     }
 }
 
@@ -166,13 +171,13 @@ fn inconclusive(
 
 /// The verdict on effects that raise the error on the test logs. Something is certainly missing if a significant
 /// residual is left.
-fn contradicted(established: usize, left: &Unexplained) -> (Verdict, String) {
+fn contradicted(chosen: &Chosen, left: &Unexplained) -> (Verdict, String) {
     let reason = "the effects lower the loss on left-out blocks of the training logs but raise the error on the test \
                   logs: do not use them until logs of more varied motion confirm them";
     if !left.is_significant() {
         return (Verdict::Inconclusive, reason.into());
     }
-    let (verdict, _) = conclusion(established, left);
+    let (verdict, _) = conclusion(chosen, left);
     (verdict, format!("{reason}; {}", what_is_left(left)))
 }
 
@@ -185,10 +190,13 @@ fn what_is_left(left: &Unexplained) -> String {
     }
 }
 
-fn conclusion(added: usize, left: &Unexplained) -> (Verdict, String) {
+fn conclusion(chosen: &Chosen, left: &Unexplained) -> (Verdict, String) {
     let what_is_left = what_is_left(left);
-    let nothing = "no effect in the library lowers the loss on left-out blocks";
-    match (added, left.is_significant()) {
+    let nothing = match chosen.standings.is_empty() {
+        true => "no effect in the library lowers the loss on left-out blocks",
+        false => "none of the effects that lower the loss on left-out blocks is established",
+    };
+    match (chosen.established(), left.is_significant()) {
         (0, false) => (Verdict::NoMissingEffect, nothing.into()),
         (0, true) => {
             let reason = format!("{nothing}, and {what_is_left}");

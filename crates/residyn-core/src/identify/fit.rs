@@ -1,5 +1,5 @@
 use super::levenberg_marquardt::LevenbergMarquardt;
-use super::outcome::{Fit, FitError, Termination};
+use super::outcome::{Fit, FitError, Led, Termination};
 use super::search::{Purpose, Search};
 use super::shooting::Shooting;
 use super::solver::Solver;
@@ -70,8 +70,27 @@ pub fn fit_below(
     let search = Search::new(shooting, dynamics, active, start_states, Some(scale))?;
     let mut search = search.to(Purpose::Choose { below });
     let termination = solver.solve(&mut search);
-    let found = (termination != Termination::GivenUp).then(|| search.finish(termination));
-    Ok(found)
+    let is_of_use = search.cost() - search.prior_cost() < below;
+    Ok(is_of_use.then(|| search.finish(termination)))
+}
+
+/// Where a solver leads the values at a given scale, if only a cost below `below` is of use: less than [`fit_below`] says,
+/// and sooner. `None` if the solver gives up.
+///
+/// # Errors
+/// As [`fit`].
+pub fn led_below(
+    solver: &dyn Solver,
+    shooting: &Shooting<'_>,
+    dynamics: &Dynamics,
+    active: &[usize],
+    start_states: Vec<Vec<f64>>,
+    (scale, below): (f64, f64),
+) -> Result<Option<Led>, FitError> {
+    let search = Search::new(shooting, dynamics, active, start_states, Some(scale))?;
+    let mut search = search.to(Purpose::Choose { below });
+    let termination = solver.solve(&mut search);
+    Ok((termination != Termination::GivenUp).then(|| search.led()))
 }
 
 /// Evaluate a model without changing a value: the normal equations of each window in the parameters `active`.

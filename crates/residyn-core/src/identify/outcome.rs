@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::intervals::count;
 use super::normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
-use super::values::Column;
+use super::values::{Column, Values};
 use crate::decomposition::eigen;
 
 /// Why parameters could not be fitted.
@@ -20,6 +20,16 @@ pub enum FitError {
         "with its starting values the model diverges in {diverged} of {windows} windows of the logs; give parameters closer to those of the rig in the model file"
     )]
     Diverged { diverged: usize, windows: usize },
+}
+
+/// Where some steps of a fit led.
+#[derive(Debug, Clone)]
+pub struct Led {
+    pub values: Values,
+    /// Each window's own values, as in a [`Fit`].
+    pub start_states: Vec<Vec<f64>>,
+    /// Sum of the losses, as in a [`Fit`].
+    pub cost: f64,
 }
 
 /// The result of a fit apart from the values found: its cost, how it ended, and the normal equations there.

@@ -2,7 +2,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::active_set::step_within_bounds;
 use super::normal_equations::{Normal, Reduced, WindowTerms, solve_part};
-use super::outcome::{Fit, FitError, Termination};
+use super::outcome::{Fit, FitError, Led, Termination};
 use super::sensitivity::Tangent;
 use super::shooting::Shooting;
 use super::values::{Layout, Values};
@@ -246,6 +246,15 @@ impl<'a> Search<'a> {
             matrix[(i, i)] += damping * matrix[(i, i)] + floor;
         }
         matrix
+    }
+
+    /// Where the search has led.
+    pub(super) fn led(self) -> Led {
+        Led {
+            cost: self.cost - self.prior_cost(),
+            values: self.at.values,
+            start_states: self.at.start_states,
+        }
     }
 
     /// The result of the search.

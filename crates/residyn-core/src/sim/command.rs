@@ -367,10 +367,26 @@ impl<'l> History<'l> {
         rows.collect()
     }
 
-    /// The first row whose command has not acted `since` seconds after the first row.
+    /// The first row whose command has not acted `since` seconds after the first row. Rows are nearly evenly spaced, so the
+    /// search begins where it would end if they were.
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss
+    )]
     fn next(&self, since: f64) -> usize {
-        let time = since - self.delay;
-        self.time.partition_point(|t| *t - self.time[0] < time)
+        let (time, rows) = (since - self.delay, self.time.len());
+        let has_acted = |row: usize| self.since(row) < time;
+        let share = time / self.since(rows - 1);
+        let [mut low, mut high] = [((share * rows as f64) as usize).min(rows); 2];
+        let mut stride = 1;
+        while high < rows && has_acted(high) {
+            (low, high, stride) = (high + 1, (high + stride).min(rows), 2 * stride);
+        }
+        while low > 0 && !has_acted(low - 1) {
+            (low, high, stride) = (low.saturating_sub(stride), low - 1, 2 * stride);
+        }
+        low + self.time[low..high].partition_point(|t| *t - self.time[0] < time)
     }
 
     /// The same from a row on, for times in ascending order less the delay.
@@ -439,6 +455,30 @@ impl Instant {
             value: (end.integral - self.integral) / length,
             by_delay: (self.output - end.output) / length,
             by_lag: (end.integral_by_lag - self.integral_by_lag) / length,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::borrow::Cow;
+
+    use super::History;
+
+    #[test]
+    fn the_next_command_is_found_however_the_rows_are_spaced() {
+        let even: Vec<f64> = (0..50).map(|row| 7.0 + 0.01 * f64::from(row)).collect();
+        let bent: Vec<f64> = (0..50).map(|row| 7.0 + f64::from(row).powi(4)).collect();
+        for time in [vec![7.0], even, bent] {
+            let span = time[time.len() - 1] - time[0];
+            let command = Cow::Owned(vec![0.0; time.len()]);
+            let history = History::new(&time, command, 0.25 * span, 0.0);
+            for part in -2..=60 {
+                let since = f64::from(part) * 0.02 * span;
+                let mut rows = 0..time.len();
+                let next = rows.find(|row| history.since(*row) >= since - history.delay);
+                assert_eq!(history.next(since), next.unwrap_or(time.len()), "{since}");
+            }
         }
     }
 }

@@ -115,7 +115,7 @@ pub fn best_start(
         ErrorModel::InverseDynamics => best_by_cost(problem, fitted, starts),
         ErrorModel::OutputError => {
             let best = fitted_on_sample(problem, fitted, starts, below)?;
-            best.model.effects.last().cloned()
+            best.effects.last().cloned()
         }
     }
 }

@@ -1,8 +1,11 @@
+use std::collections::HashSet;
+
 use super::candidate::{acting, best_start, has_switch, numbered, screened_cost_on_sample, starts};
 use super::identity::EffectId;
 use super::on_sample::cost_on_sample;
 use super::screening::Screening;
 use super::sets::lowest;
+use super::trial::Trial;
 use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
@@ -11,8 +14,37 @@ use crate::model::{Effect, FittedEffect};
 /// A set in which one of a model's effects is replaced by another.
 pub(super) struct Exchange {
     pub set: Vec<FittedEffect>,
-    /// Identifies the replaced effect and its replacement.
-    pub pair: [EffectId; 2],
+    pub pair: Pair,
+}
+
+/// Identifies an effect and its replacement.
+pub(super) type Pair = [EffectId; 2];
+
+/// Exchanges that came nowhere near the set that they were tried in.
+pub(super) struct Hopeless {
+    pairs: HashSet<Pair>,
+    /// Loss of the model, in units of the sensors' noise, since when they count.
+    loss: f64,
+}
+
+impl Default for Hopeless {
+    /// None was tried.
+    fn default() -> Self {
+        Self {
+            pairs: HashSet::new(),
+            loss: f64::INFINITY,
+        }
+    }
+}
+
+impl Hopeless {
+    /// Once the loss has fallen far, any exchange is worth a try.
+    pub fn forget_after_far_fall(&mut self, problem: &Problem<'_>, from: &Trial) {
+        if from.has_fallen_far(self.loss, &problem.settings.select) {
+            self.pairs.clear();
+            self.loss = from.loss_in_noise();
+        }
+    }
 }
 
 /// One of a model's effects, by its place, and another that may replace it.
@@ -25,11 +57,23 @@ struct Swap {
 /// Added to the model, such an effect predicts little gain, since each does most of what the other does. An effect with
 /// a whole number, which was found with other effects in the set, is also exchanged for itself with another number: the
 /// one with the largest predicted gain, and those next to the present one. Exchanges that are predicted to leave a loss
-/// beyond the limit on left-out blocks are left out.
-pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted, limit: f64) -> Vec<Exchange> {
+/// beyond the limit on left-out blocks are left out, and so are the `hopeless` ones, whose fits to the sample of windows came
+/// nowhere near the model's: those that turn out to be are added to them.
+pub(super) fn exchanges(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    limit: f64,
+    hopeless: &mut Hopeless,
+) -> Vec<Exchange> {
     let declared = problem.declared.effects.len();
     let fitted = fitted.clone().without_windows();
-    let swaps = promising(problem, &fitted, swaps(problem, &fitted), limit);
+    let pair = |swap: &Swap| {
+        let old = &fitted.model.effects[swap.place];
+        [problem.id(old), problem.id(&swap.new)]
+    };
+    let mut swaps = swaps(problem, &fitted);
+    swaps.retain(|swap| !hopeless.pairs.contains(&pair(swap)));
+    let swaps = promising(problem, &fitted, swaps, limit);
     if swaps.is_empty() {
         return Vec::new();
     }
@@ -37,13 +81,18 @@ pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted, limit: f64) -> V
         return Vec::new();
     };
     let mut sets = Vec::new();
-    for Swap { place, new } in swaps {
+    for swap in swaps {
+        let (pair, Swap { place, new }) = (pair(&swap), swap);
         let mut rest = fitted.clone();
         let old = rest.model.effects.remove(place);
         let is_itself = new.effect.name == old.effect.name;
         let mut starts = Vec::new();
         if !is_itself || has_switch(&new) {
-            starts.extend(in_place_of(problem, &rest, (&old, &new), below));
+            let start = in_place_of(problem, &rest, (&old, &new), below);
+            if start.is_none() {
+                hopeless.pairs.insert(pair);
+            }
+            starts.extend(start);
         }
         if is_itself {
             starts.extend(with_numbers_beside(problem, &rest, &old, below));

@@ -6,6 +6,7 @@ mod equations;
 mod evidence;
 mod exchange;
 mod folds;
+mod helpful;
 mod identity;
 mod knowledge;
 mod losses;

@@ -4,23 +4,32 @@ use super::trial::is_consistent;
 use crate::closeloop::error_model::ErrorModel;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
-use crate::identify::{LevenbergMarquardt, fit_below};
+use crate::identify::{Led, LevenbergMarquardt, led_below};
 use crate::model::{FittedEffect, Model};
 
-/// All starts are taken as far as this many steps of a fit, and the best few of them as far as some more, while they may
-/// still do better than what there is.
-const FIRST_STEPS: LevenbergMarquardt = at_most(4);
+/// All starts are taken so many steps of a fit further in turn, and after each turn the better half of them stays, but no
+/// fewer than [`FEW`]: successive halving (Jamieson and Talwalkar 2016).
+const FIRST_STEPS: [usize; 3] = [1, 1, 2];
+const FEW: usize = 4;
+
+/// Then those that are left go on, while they may still do better than what there is.
 const MORE_STEPS: LevenbergMarquardt = LevenbergMarquardt {
     first_steps: 0,
     ..at_most(10)
 };
-const FEW: usize = 4;
 
 const fn at_most(most_steps: usize) -> LevenbergMarquardt {
     LevenbergMarquardt {
         most_steps,
         ..LevenbergMarquardt::USUAL
     }
+}
+
+/// A model on its way to the minimum over the sample of windows.
+struct OnItsWay {
+    model: Model,
+    start_states: Vec<Vec<f64>>,
+    cost: f64,
 }
 
 /// A model with a candidate more, at the values with the lowest cost over the sample of windows that fits from these starts
@@ -30,38 +39,31 @@ pub fn fitted_on_sample(
     fitted: &Fitted,
     starts: Vec<FittedEffect>,
     below: f64,
-) -> Option<Fitted> {
+) -> Option<Model> {
     let scale = fitted.fit.scale;
-    let states = problem.sample.start_states(&fitted.fit.start_states);
-    let begin = |start: FittedEffect| {
-        let model = fitted.model.with_effects(fitted.effects_and(&[start]));
-        moved(
-            problem,
-            &FIRST_STEPS,
-            &model,
-            &states,
-            (scale, f64::INFINITY),
-        )
+    let start_states = problem.sample.start_states(&fitted.fit.start_states);
+    let begin = |start: FittedEffect| OnItsWay {
+        model: fitted.model.with_effects(fitted.effects_and(&[start])),
+        start_states: start_states.clone(),
+        cost: f64::INFINITY,
     };
-    let end = |Fitted { model, fit }| {
-        moved(
-            problem,
-            &MORE_STEPS,
-            &model,
-            &fit.start_states,
-            (scale, below),
-        )
+    let further = |all: Vec<OnItsWay>, solver: &LevenbergMarquardt, below: f64| {
+        let led = (all.into_par_iter()).filter_map(|one| one.led(problem, solver, (scale, below)));
+        by_cost(led.collect())
     };
-    let mut begun = by_cost(starts.into_par_iter().filter_map(begin).collect());
-    // Where nothing shows a difference, as that of the side of a friction that the model does not have.
-    begun.dedup_by(|a, b| a.fit.cost == b.fit.cost);
-    begun.truncate(FEW);
-    let ended = by_cost(begun.into_par_iter().filter_map(end).collect());
-    let last = |found: &Fitted| found.model.effects.last().cloned();
-    let is_of_use = |found: &Fitted| {
-        found.fit.cost < below && last(found).is_some_and(|effect| is_consistent(&effect))
+    let mut all: Vec<OnItsWay> = starts.into_iter().map(begin).collect();
+    for steps in FIRST_STEPS {
+        let half = all.len().div_ceil(2);
+        all = further(all, &at_most(steps), f64::INFINITY);
+        // Where nothing shows a difference, as that of the side of a friction that the model does not have.
+        all.dedup_by(|a, b| a.cost == b.cost);
+        all.truncate(half.max(FEW));
+    }
+    let ended = further(all, &MORE_STEPS, below);
+    let is_of_use = |found: &OnItsWay| {
+        found.cost < below && found.model.effects.last().is_some_and(is_consistent)
     };
-    ended.into_iter().find(is_of_use)
+    Some(ended.into_iter().find(is_of_use)?.model)
 }
 
 /// The cost over the sample of windows of a model with its values free. It is infinite if torques are compared: a
@@ -70,29 +72,42 @@ pub fn cost_on_sample(problem: &Problem<'_>, fitted: &Fitted) -> Option<f64> {
     if problem.error_model == ErrorModel::InverseDynamics {
         return Some(f64::INFINITY);
     }
-    let states = problem.sample.start_states(&fitted.fit.start_states);
+    let begin = OnItsWay {
+        model: fitted.model.clone(),
+        start_states: problem.sample.start_states(&fitted.fit.start_states),
+        cost: f64::INFINITY,
+    };
     let aim = (fitted.fit.scale, f64::INFINITY);
-    let moved = moved(problem, &MORE_STEPS, &fitted.model, &states, aim)?;
-    Some(moved.fit.cost)
+    Some(begin.led(problem, &MORE_STEPS, aim)?.cost)
 }
 
-/// A model after some steps of a fit to the sample of windows, at this scale of the residuals and with this cost in view.
-fn moved(
-    problem: &Problem<'_>,
-    solver: &LevenbergMarquardt,
-    model: &Model,
-    start_states: &[Vec<f64>],
-    aim: (f64, f64),
-) -> Option<Fitted> {
-    let (shooting, states) = (&problem.sample.shooting, start_states.to_vec());
-    let found = problem.fitted_by(model, |dynamics, active| {
-        let found = fit_below(solver, shooting, dynamics, active, states, aim);
-        found.ok().flatten().ok_or(())
-    });
-    found.ok()
+impl OnItsWay {
+    /// The same after some steps of a fit to the sample of windows, at this scale of the residuals and with this cost in
+    /// view.
+    fn led(
+        self,
+        problem: &Problem<'_>,
+        solver: &LevenbergMarquardt,
+        aim: (f64, f64),
+    ) -> Option<Self> {
+        let model = problem.smoothed(&self.model);
+        let dynamics = problem.error_model.compile(&model);
+        let (shooting, active) = (&problem.sample.shooting, problem.active(&dynamics));
+        let led = led_below(solver, shooting, &dynamics, &active, self.start_states, aim);
+        let Led {
+            values,
+            start_states,
+            cost,
+        } = led.ok()??;
+        Some(Self {
+            model: model.at(&values.put_into(&dynamics, problem.logs)),
+            start_states,
+            cost,
+        })
+    }
 }
 
-fn by_cost(mut all: Vec<Fitted>) -> Vec<Fitted> {
-    all.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+fn by_cost(mut all: Vec<OnItsWay>) -> Vec<OnItsWay> {
+    all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     all
 }

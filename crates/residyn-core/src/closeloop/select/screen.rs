@@ -1,4 +1,4 @@
-use super::candidate::{beside, best_by_cost, has_switch, starts};
+use super::candidate::{beside, best_by_cost};
 use super::on_sample::{cost_on_sample, fitted_on_sample};
 use super::screening::Screening;
 use super::sets::best_predicted;
@@ -9,37 +9,32 @@ use crate::data::Joint;
 use crate::model::FittedEffect;
 
 /// The sets of effects with the largest predicted fall of a fitted model's loss, the best first, each beyond the
-/// declared effects. All candidates are linearised at once, and sets are compared without a fit. Effects that no value
-/// switches off cannot be compared this way and come last, each alone added to the effects of the model, if it is worth a fit.
+/// declared effects. All candidates, each of which some value switches off, are linearised at once, and sets are compared
+/// without a fit.
 pub fn screen(
     problem: &Problem<'_>,
     fitted: &Fitted,
     candidates: &[FittedEffect],
 ) -> Vec<Vec<FittedEffect>> {
-    let mut sets = Vec::new();
-    if let Some(screening) = Screening::of(problem, fitted, candidates) {
-        let predicted = best_predicted(&screening, problem);
-        sets = predicted.iter().map(|set| screening.effects(set)).collect();
-    }
-    if let Some(beside) = OneMore::beside(problem, fitted) {
-        let unswitched = candidates.iter().filter(|c| !has_switch(c)).map(starts);
-        sets.extend(unswitched.filter_map(|starts| beside.with(starts)));
-    }
-    sets
+    let Some(screening) = Screening::of(problem, fitted, candidates) else {
+        return Vec::new();
+    };
+    let predicted = best_predicted(&screening, problem);
+    predicted.iter().map(|set| screening.effects(set)).collect()
 }
 
-/// The effects of a fitted model with one transmission more, of which these are the starts, if it is worth a fit. Play is a
-/// spring that is soft in its middle: where no spring helps, it is not tried.
-pub fn with_transmissions(
+/// The effects of a fitted model with one more that no value switches off, of which these are the starts, if it is worth a
+/// fit. Play is a spring that is soft in its middle: where no spring helps, it is not tried.
+pub fn with_one_more(
     problem: &Problem<'_>,
     fitted: &Fitted,
-    transmissions: Vec<Vec<FittedEffect>>,
+    more: Vec<Vec<FittedEffect>>,
 ) -> Vec<Vec<FittedEffect>> {
     let Some(beside) = OneMore::beside(problem, fitted) else {
         return Vec::new();
     };
     let has_play = |starts: &Vec<FittedEffect>| starts.iter().any(|start| start.effect.has_play());
-    let (plays, springs): (Vec<_>, Vec<_>) = transmissions.into_iter().partition(has_play);
+    let (plays, springs): (Vec<_>, Vec<_>) = more.into_iter().partition(has_play);
     let joint = |starts: &Vec<FittedEffect>| starts.first().map(|start| start.joint);
     let springs = springs.into_iter();
     let springs = springs.map(|spring| (joint(&spring), beside.with(spring)));
@@ -78,7 +73,7 @@ impl<'a, 'p> OneMore<'a, 'p> {
         let beside = beside(self.problem, self.fitted, starts.first()?)?;
         let with = match self.problem.error_model {
             ErrorModel::OutputError => {
-                fitted_on_sample(self.problem, &beside, starts, self.enough)?.model
+                fitted_on_sample(self.problem, &beside, starts, self.enough)?
             }
             ErrorModel::InverseDynamics => {
                 let best = best_by_cost(self.problem, &beside, starts)?;

@@ -4,12 +4,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::baseline::baseline_sets;
-use super::candidate::{candidates, starts};
-use super::exchange::{Exchange, exchanges};
+use super::candidate::{candidates, has_switch};
+use super::exchange::{Exchange, Hopeless, Pair, exchanges};
+use super::helpful::Helpful;
 use super::identity::EffectId;
 use super::open_loop_check::OpenLoopCheck;
 use super::scale::at_other_scales;
-use super::screen::{screen, with_transmissions};
+use super::screen::screen;
 use super::screening::Screening;
 use super::sets::descent;
 use super::simpler::{repaired, simpler};
@@ -46,19 +47,13 @@ struct Search<'a> {
     watch: &'a dyn Watch,
     usual: Option<Fitted>,
     rounds: Vec<Round>,
-    /// Exchanges that made the set worse since a round changed it: the old and the new effect.
-    rejected: HashSet<[EffectId; 2]>,
-    helpful: Helpful,
+    /// Exchanges that made the set worse since a round changed it.
+    rejected: HashSet<Pair>,
+    hopeless: Hopeless,
+    transmissions: Helpful,
+    others: Helpful,
     /// The current activity, as last reported.
     doing: String,
-}
-
-/// The transmissions that help.
-struct Helpful {
-    /// At the values that fits to the sample of windows led them to.
-    transmissions: Vec<FittedEffect>,
-    /// Loss of the model, in units of the sensors' noise, with which all were last tried from all of their starts.
-    loss: f64,
 }
 
 /// A set that is better than the one that its round began with, and its rank in the round.
@@ -111,10 +106,9 @@ impl<'a> Search<'a> {
             usual: None,
             rounds: Vec::new(),
             rejected: HashSet::new(),
-            helpful: Helpful {
-                transmissions: Vec::new(),
-                loss: f64::INFINITY,
-            },
+            hopeless: Hopeless::default(),
+            transmissions: Helpful::default(),
+            others: Helpful::default(),
             doing: Stage::Select.text().into(),
         }
     }
@@ -287,40 +281,20 @@ impl<'a> Search<'a> {
         let (transmissions, others): (Vec<_>, Vec<_>) =
             (candidates.into_iter()).partition(|new| new.effect.is_transmission());
         self.say(&format!("screening {} effects", others.len()));
-        let sets = screen(problem, &from.fitted, &others);
+        let (switched, unswitched): (Vec<_>, Vec<_>) = others.into_iter().partition(has_switch);
+        let mut sets = screen(problem, &from.fitted, &switched);
+        sets.extend(self.others.with_one_more(problem, from, unswitched));
         self.say(&format!("fitting {} sets of effects", sets.len()));
         let mut fitted = self.fitted_for_the_best(from, sets);
         let is_large = |trial: &Trial| self.is_large_gain(trial, from);
         if !transmissions.is_empty() && !fitted.iter().any(is_large) {
             self.say("fitting transmissions");
-            let sets = self.transmissions(from, transmissions);
+            let sets = self
+                .transmissions
+                .with_one_more(problem, from, transmissions);
             fitted.extend(self.fitted_for_the_best(from, sets));
         }
         self.noted(from, fitted, number)
-    }
-
-    /// The sets with one of these transmissions more that are worth a fit. Those that did not help are tried again, and the
-    /// others from all of their starts, once the loss has fallen far since.
-    fn transmissions(&mut self, from: &Trial, all: Vec<FittedEffect>) -> Vec<Vec<FittedEffect>> {
-        let problem = self.problem;
-        let loss = from.loss() * from.fitted.fit.scale.powi(2);
-        let has_fallen = loss < self.helpful.loss * (1.0 - problem.settings.select.large_gain);
-        if has_fallen {
-            self.helpful.loss = loss;
-        }
-        let led_to = |new: &FittedEffect| {
-            let mut helpful = self.helpful.transmissions.iter();
-            helpful.find(|led| led.joint == new.joint && led.effect.name == new.effect.name)
-        };
-        let starts = |new: &FittedEffect| match has_fallen {
-            true => Some(starts(new)),
-            false => led_to(new).map(|led| vec![led.clone()]),
-        };
-        let starts = all.iter().filter_map(starts).collect();
-        let sets = with_transmissions(problem, &from.fitted, starts);
-        let helpful = sets.iter().filter_map(|set| set.last().cloned());
-        self.helpful.transmissions = helpful.collect();
-        sets
     }
 
     fn is_large_gain(&self, trial: &Trial, from: &Trial) -> bool {
@@ -376,7 +350,9 @@ impl<'a> Search<'a> {
     fn exchanged(&mut self, from: &Trial) -> Vec<Trial> {
         self.say("exchanging effects");
         let problem = self.problem;
-        let mut exchanges = exchanges(problem, &from.fitted, self.promising_below(from));
+        self.hopeless.forget_after_far_fall(problem, from);
+        let limit = self.promising_below(from);
+        let mut exchanges = exchanges(problem, &from.fitted, limit, &mut self.hopeless);
         exchanges.retain(|exchange| !self.rejected.contains(&exchange.pair));
         if exchanges.is_empty() {
             return Vec::new();
@@ -416,7 +392,8 @@ impl<'a> Search<'a> {
             let effects = &current.fitted.model.effects;
             let simpler = simpler(problem, effects, added.clone()).into_iter();
             let mut sets: Vec<_> = simpler.map(|set| set[declared..].to_vec()).collect();
-            let exchanges = exchanges(problem, &current.fitted, self.promising_below(best));
+            let limit = self.promising_below(best);
+            let exchanges = exchanges(problem, &current.fitted, limit, &mut self.hopeless);
             sets.extend(exchanges.into_iter().map(|exchange| exchange.set));
             sets.extend(at_other_scales(problem.declared, &effects[declared..]));
             sets.extend(self.without_one(&current, best));

@@ -65,6 +65,16 @@ impl Trial {
         self.losses.total() + self.prior
     }
 
+    /// The loss in units of the sensors' noise, whatever the scale.
+    pub fn loss_in_noise(&self) -> f64 {
+        self.loss() * self.fitted.fit.scale.powi(2)
+    }
+
+    /// Whether the loss, in units of the sensors' noise, is below another by a large share.
+    pub fn has_fallen_far(&self, before: f64, settings: &SelectSettings) -> bool {
+        self.loss_in_noise() < before * (1.0 - settings.large_gain)
+    }
+
     /// The loss on the joints of an effect, and by the declared values, as a share of that of the trial without the effect:
     /// by how much it falls.
     pub fn gain_over(&self, without: &Self, effect: &FittedEffect) -> f64 {
