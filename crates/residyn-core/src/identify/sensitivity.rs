@@ -576,12 +576,9 @@ impl<'t> TangentStepper<'t> {
     ) {
         let rows = 2 * n;
         let inner = if is_first { &self.now } else { &self.inner };
-        let columns = (self.now.chunks_exact(rows))
-            .zip(inner.chunks_exact(rows))
-            .zip(self.next.chunks_exact_mut(rows))
-            .zip(self.sum.chunks_exact_mut(rows));
+        let columns = columns(rows, [&self.now, inner], [&mut self.next, &mut self.sum]);
         let by_state = &self.by_state[..n * rows];
-        for (column, (((now, inner), next), sum)) in columns.enumerate() {
+        for (column, ([now, inner], [next, sum])) in columns {
             let direct = self.tangent.direct(column);
             for part in 0..Lane::parts::<S>() {
                 let (weighed, reached) = (weighed.get(simd, part), reached.get(simd, part));
@@ -626,27 +623,22 @@ impl<'t> TangentStepper<'t> {
         let Self { tangent, tape, .. } = self;
         let (n, rows, has_jumps) = (tangent.joints, tangent.states(), tangent.has_jumps());
         let inner = if is_first { &self.now } else { &self.inner };
-        let columns = (self.now.chunks_exact(rows))
-            .zip(inner.chunks_exact(rows))
-            .zip(self.next.chunks_exact_mut(rows))
-            .zip(self.sum.chunks_exact_mut(rows));
-        for (column, (((now, inner), next), sum)) in columns.enumerate() {
+        let columns = columns(rows, [&self.now, inner], [&mut self.next, &mut self.sum]);
+        for (column, ([now, inner], [next, sum])) in columns {
             let direct = tangent.direct(column);
             for row in 0..rows {
                 // Among the slopes: jumps are the last.
                 let place = if row < n { rows + row } else { row } - n;
-                let is_velocity = row < n;
-                let own = (direct.filter(|_| !is_velocity || has_jumps))
-                    .map(|first| tape.output(first + place));
-                let mut slope = match (is_velocity, own) {
-                    (true, _) => inner[n + row],
-                    (false, Some(own)) => *own,
-                    (false, None) => Row::splat(0.0),
+                let is_position = row < n;
+                let own = direct.filter(|_| !is_position || has_jumps);
+                let mut slope = match is_position {
+                    true => inner[n + row],
+                    false => Row::splat(0.0),
                 };
-                if let (true, Some(jump)) = (is_velocity, own) {
-                    add(simd, &mut slope, jump);
+                if let Some(first) = own {
+                    add(simd, &mut slope, tape.output(first + place));
                 }
-                if column > 0 && (!is_velocity || has_jumps) {
+                if column > 0 && (!is_position || has_jumps) {
                     if place < n {
                         let by_state = &self.by_state[place * rows..][..rows];
                         for (by, state) in by_state.iter().zip(inner) {
@@ -671,6 +663,20 @@ impl<'t> TangentStepper<'t> {
             }
         }
     }
+}
+
+/// Each derivative and its rows: those at the start of a step and in a stage of it, and those of the next stage and of the
+/// sum over stages.
+#[inline(always)]
+fn columns<'a>(
+    rows: usize,
+    [now, inner]: [&'a [Lane]; 2],
+    [next, sum]: [&'a mut [Lane]; 2],
+) -> impl Iterator<Item = (usize, ([&'a [Lane]; 2], [&'a mut [Lane]; 2]))> {
+    let read = now.chunks_exact(rows).zip(inner.chunks_exact(rows));
+    let written = next.chunks_exact_mut(rows).zip(sum.chunks_exact_mut(rows));
+    let columns = read.zip(written).enumerate();
+    columns.map(|(column, (read, written))| (column, (read.into(), written.into())))
 }
 
 /// Add a row to another, register by register.

@@ -2,7 +2,7 @@
 
 use super::baseline::{baseline_friction, baseline_sets};
 use super::candidate::candidates;
-use super::exchange::{Exchange, exchanges};
+use super::exchange::{Exchange, Hopeless, exchanges};
 use super::folds::{Folds, left_out_losses, predicted};
 use super::screening::Screening;
 use super::simpler::{parts, repaired, simpler};
@@ -243,7 +243,7 @@ effect = [
     let wrong = problem.with_effects(&fitted, set).unwrap();
     let delay = wrong.model.effects[0].values[0].0;
     assert!(delay > 0.01);
-    let all = exchanges(&problem, &wrong, f64::INFINITY);
+    let all = exchanges(&problem, &wrong, f64::INFINITY, &mut Hopeless::default());
     for number in [5.0, 7.0] {
         let mut ripple = wrong.model.effects[1].clone();
         ripple.values[1].0 = number;
