@@ -89,7 +89,8 @@ pub(super) fn exchanges(
         let mut starts = Vec::new();
         if !is_itself || has_switch(&new) {
             let start = in_place_of(problem, &rest, (&old, &new), below);
-            if start.is_none() {
+            // Which transmission it is may show only once the friction of the link is found.
+            if start.is_none() && !new.effect.is_transmission() {
                 hopeless.pairs.insert(pair);
             }
             starts.extend(start);

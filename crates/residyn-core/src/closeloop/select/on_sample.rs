@@ -7,16 +7,14 @@ use crate::closeloop::problem::Problem;
 use crate::identify::{Led, LevenbergMarquardt, led_below};
 use crate::model::{FittedEffect, Model};
 
-/// All starts are taken so many steps of a fit further in turn, and after each turn the better half of them stays, but no
-/// fewer than [`FEW`]: successive halving (Jamieson and Talwalkar 2016).
-const FIRST_STEPS: [usize; 3] = [1, 1, 2];
-const FEW: usize = 4;
-
-/// Then those that are left go on, while they may still do better than what there is.
+/// All starts are taken as far as this many steps of a fit, and the best few of them as far as some more, while they may
+/// still do better than what there is.
+const FIRST_STEPS: LevenbergMarquardt = at_most(4);
 const MORE_STEPS: LevenbergMarquardt = LevenbergMarquardt {
     first_steps: 0,
     ..at_most(10)
 };
+const FEW: usize = 4;
 
 const fn at_most(most_steps: usize) -> LevenbergMarquardt {
     LevenbergMarquardt {
@@ -51,15 +49,12 @@ pub fn fitted_on_sample(
         let led = (all.into_par_iter()).filter_map(|one| one.led(problem, solver, (scale, below)));
         by_cost(led.collect())
     };
-    let mut all: Vec<OnItsWay> = starts.into_iter().map(begin).collect();
-    for steps in FIRST_STEPS {
-        let half = all.len().div_ceil(2);
-        all = further(all, &at_most(steps), f64::INFINITY);
-        // Where nothing shows a difference, as that of the side of a friction that the model does not have.
-        all.dedup_by(|a, b| a.cost == b.cost);
-        all.truncate(half.max(FEW));
-    }
-    let ended = further(all, &MORE_STEPS, below);
+    let all = starts.into_iter().map(begin).collect();
+    let mut begun = further(all, &FIRST_STEPS, f64::INFINITY);
+    // Where nothing shows a difference, as that of the side of a friction that the model does not have.
+    begun.dedup_by(|a, b| a.cost == b.cost);
+    begun.truncate(FEW);
+    let ended = further(begun, &MORE_STEPS, below);
     let is_of_use = |found: &OnItsWay| {
         found.cost < below && found.model.effects.last().is_some_and(is_consistent)
     };
