@@ -67,9 +67,8 @@ pub fn fit_below(
     start_states: Vec<Vec<f64>>,
     (scale, below): (f64, f64),
 ) -> Result<Option<(Values, Fit)>, FitError> {
-    let search = Search::new(shooting, dynamics, active, start_states, Some(scale))?;
-    let mut search = search.to(Purpose::Choose { below });
-    let termination = solver.solve(&mut search);
+    let aim = (scale, below);
+    let (search, termination) = led(solver, shooting, dynamics, active, start_states, aim)?;
     let is_of_use = search.cost() - search.prior_cost() < below;
     Ok(is_of_use.then(|| search.finish(termination)))
 }
@@ -85,12 +84,25 @@ pub fn led_below(
     dynamics: &Dynamics,
     active: &[usize],
     start_states: Vec<Vec<f64>>,
-    (scale, below): (f64, f64),
+    aim: (f64, f64),
 ) -> Result<Option<Led>, FitError> {
+    let (search, termination) = led(solver, shooting, dynamics, active, start_states, aim)?;
+    Ok((termination != Termination::GivenUp).then(|| search.led()))
+}
+
+/// A search at a given scale, with a cost in view, where a solver leads it.
+fn led<'a>(
+    solver: &dyn Solver,
+    shooting: &'a Shooting<'a>,
+    dynamics: &'a Dynamics,
+    active: &[usize],
+    start_states: Vec<Vec<f64>>,
+    (scale, below): (f64, f64),
+) -> Result<(Search<'a>, Termination), FitError> {
     let search = Search::new(shooting, dynamics, active, start_states, Some(scale))?;
     let mut search = search.to(Purpose::Choose { below });
     let termination = solver.solve(&mut search);
-    Ok((termination != Termination::GivenUp).then(|| search.led()))
+    Ok((search, termination))
 }
 
 /// Evaluate a model without changing a value: the normal equations of each window in the parameters `active`.
