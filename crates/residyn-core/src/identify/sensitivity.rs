@@ -665,14 +665,17 @@ impl<'t> TangentStepper<'t> {
     }
 }
 
-/// Each derivative and its rows: those at the start of a step and in a stage of it, and those of the next stage and of the
-/// sum over stages.
+/// The rows of a derivative: those at the start of a step and in a stage of it, and those of the next stage and of the sum over
+/// stages.
+type Rows<'a> = ([&'a [Lane]; 2], [&'a mut [Lane]; 2]);
+
+/// Each derivative and its rows.
 #[inline(always)]
 fn columns<'a>(
     rows: usize,
     [now, inner]: [&'a [Lane]; 2],
     [next, sum]: [&'a mut [Lane]; 2],
-) -> impl Iterator<Item = (usize, ([&'a [Lane]; 2], [&'a mut [Lane]; 2]))> {
+) -> impl Iterator<Item = (usize, Rows<'a>)> {
     let read = now.chunks_exact(rows).zip(inner.chunks_exact(rows));
     let written = next.chunks_exact_mut(rows).zip(sum.chunks_exact_mut(rows));
     let columns = read.zip(written).enumerate();
