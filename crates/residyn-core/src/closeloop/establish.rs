@@ -65,6 +65,8 @@ pub struct Chosen {
     pub rivals: Vec<Rival>,
     /// What plainer models, which have taken the place of the one that the search found in turn, do not use.
     pub unused: Vec<Unused>,
+    /// Effects that were established beside others that left no significant residual, which a plainer model does not use.
+    pub(super) unmasked: Vec<FittedEffect>,
     /// Why there are no effects, if the chosen model could not be fitted.
     pub failure: Option<FitError>,
 }
@@ -80,6 +82,7 @@ impl Chosen {
             stopped: false,
             rivals: Vec::new(),
             unused: Vec::new(),
+            unmasked: Vec::new(),
             failure: None,
         }
     }

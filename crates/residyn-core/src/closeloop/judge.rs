@@ -92,7 +92,8 @@ const OUTWEIGHED: &str =
     "more than twice what it explains remains unexplained: it may be only a part of the real cause";
 
 impl Chosen {
-    /// Effects are not established if most of what their joint lacks, or more than they explain, stays unexplained.
+    /// Effects are not established if most of what their joint lacks, or more than they explain, stays unexplained, unless
+    /// they were established where nothing stayed unexplained.
     fn doubt(&mut self, problem: &Problem<'_>, before: &Fitted, diagnostics: &Unexplained) {
         let settings = &problem.settings.establish;
         let [declared, with] = [before, &self.after].map(|model| Loss::of(problem, model));
@@ -110,7 +111,11 @@ impl Chosen {
             let without = without.map(|without| Loss::of(problem, without));
             without.is_ok_and(|without| left(&without, effect) - left(&with, effect) < least)
         };
+        let unmasked = &self.unmasked;
         demote(&mut self.standings, |standing| {
+            if unmasked.iter().any(|own| own.is_same(&standing.effect)) {
+                return None;
+            }
             let masks = masks(&standing.effect).then_some(MASKING);
             let reason = masks.or_else(|| is_outweighed(standing).then_some(OUTWEIGHED))?;
             Some(reason.into())

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::error_model::ErrorModel;
-use super::establish::Chosen;
+use super::establish::{Chosen, Standing};
 use super::every_log::SetApart;
 use super::fitted::Fitted;
 use super::problem::Problem;
@@ -19,6 +19,19 @@ const GROUPS: usize = 4;
 pub(super) struct Plainer {
     pub fitted: Fitted,
     pub unused: Unused,
+}
+
+impl Plainer {
+    /// The model without an effect that is not established.
+    fn without(standing: &Standing) -> Option<Self> {
+        Some(Self {
+            fitted: standing.without.clone().ok()?,
+            unused: Unused {
+                effect: Some(standing.effect.clone()),
+                why: standing.reason.clone()?,
+            },
+        })
+    }
 }
 
 /// What a plainer model does not use, and why.
@@ -64,8 +77,8 @@ pub(super) fn plainer(
             },
         });
     }
-    if let Some(plainer) = without_doubtful_body(chosen) {
-        return Some(plainer);
+    if let Some(body) = doubtful_body(chosen) {
+        return Plainer::without(body);
     }
     let settings = &problem.settings.select;
     let least = LeftOut::of(problem, after, apart);
@@ -119,7 +132,7 @@ pub(super) fn plainer(
     let better = better.filter_map(|(other, gain)| Some((other, gain?)));
     let best = better.max_by(|(_, a), (_, b)| a.total_cmp(b));
     let Some((best, gain)) = best else {
-        return without_idle(problem, chosen);
+        return Plainer::without(idle(problem, chosen)?);
     };
     Some(Plainer {
         fitted: best.fitted.clone(),
@@ -134,37 +147,19 @@ pub(super) fn plainer(
     })
 }
 
-/// The model without a transmission that is not established: with a body and a resonance more, a fit bends to whatever is
-/// missing.
-fn without_doubtful_body(chosen: &Chosen) -> Option<Plainer> {
-    let standings = chosen.standings.iter();
-    let mut bodies = standings.filter(|standing| standing.effect.effect.is_transmission());
-    bodies.find_map(|standing| {
-        let why = standing.reason.clone()?;
-        Some(Plainer {
-            fitted: standing.without.clone().ok()?,
-            unused: Unused {
-                effect: Some(standing.effect.clone()),
-                why,
-            },
-        })
-    })
+/// A transmission that is not established: with a body and a resonance more, a fit bends to whatever is missing.
+fn doubtful_body(chosen: &Chosen) -> Option<&Standing> {
+    let mut bodies = chosen.standings.iter();
+    bodies.find(|standing| standing.effect.effect.is_transmission() && standing.reason.is_some())
 }
 
-/// The model without the effect that does least, if the loss on left-out blocks hardly rises: beside effects that a plainer
-/// model no longer has, it did more.
-fn without_idle(problem: &Problem<'_>, chosen: &Chosen) -> Option<Plainer> {
+/// The effect that does least, if the loss on left-out blocks hardly rises without it: beside effects that a plainer model
+/// no longer has, it did more.
+fn idle<'a>(problem: &Problem<'_>, chosen: &'a Chosen) -> Option<&'a Standing> {
     let most = problem.settings.select.negligible_rise;
     let idle = chosen.standings.iter();
     let idle = idle.filter(|standing| standing.gain < most && standing.reason.is_some());
-    let least = idle.min_by(|a, b| a.gain.total_cmp(&b.gain))?;
-    Some(Plainer {
-        fitted: least.without.clone().ok()?,
-        unused: Unused {
-            effect: Some(least.effect.clone()),
-            why: least.reason.clone()?,
-        },
-    })
+    idle.min_by(|a, b| a.gain.total_cmp(&b.gain))
 }
 
 /// Whether the declared model predicts the motion of the logs set apart better by more than chance, whatever the logs
@@ -209,7 +204,7 @@ impl LeftOut {
     }
 
     /// By how much the logarithm of the error is lower than another's, over both kinds of logs, if it is lower by more
-    /// than `least` on one of them.
+    /// than `least` on one of them, and not higher by more on the other.
     fn gain_over(&self, other: &Self, least: f64) -> Option<f64> {
         let gain = |own: Option<f64>, other: Option<f64>| Some(other? - own?);
         let gains = [
@@ -218,7 +213,9 @@ impl LeftOut {
         ];
         let known: Vec<f64> = gains.into_iter().flatten().collect();
         let sum: f64 = known.iter().sum();
-        (sum > 0.0 && known.iter().any(|gain| *gain > least)).then_some(sum / known.len() as f64)
+        let is_lower = sum > 0.0 && known.iter().any(|gain| *gain > least);
+        let is_contradicted = known.iter().any(|gain| *gain < -least);
+        (is_lower && !is_contradicted).then_some(sum / known.len() as f64)
     }
 }
 
@@ -232,14 +229,15 @@ fn log_error(squares: &[f64]) -> f64 {
     sum / squares.len() as f64
 }
 
-/// The squares on the training logs, each predicted by a fit to others; `None` for a single log, and for values that
-/// belong to one log.
+/// The squares on the training logs, each predicted by a fit to others; `None` for a single log, and for values of the rig
+/// that belong to one log. The zeros of sensors are unknown there, as in the logs set apart.
 fn left_in_turn(problem: &Problem<'_>, fitted: &Fitted) -> Option<Vec<f64>> {
     let groups = GROUPS.min(problem.logs.len());
     let effects = &fitted.model.effects;
-    let of_one_log = effects.iter().flat_map(|effect| &effect.effect.parameters);
+    let of_rig = (effects.iter()).filter(|effect| !effect.effect.is_of_sensor());
+    let mut of_rig = of_rig.flat_map(|effect| &effect.effect.parameters);
     let mut declared = fitted.model.parameters.iter();
-    let is_of_one_log = of_one_log.clone().any(|parameter| parameter.per_log)
+    let is_of_one_log = of_rig.any(|parameter| parameter.per_log)
         || declared.any(|parameter| parameter.per_log && !parameter.per_group);
     if groups < 2 || is_of_one_log {
         return None;
@@ -303,6 +301,9 @@ mod tests {
             // No better than chance on either, or better on one by less than it is worse on the other.
             (Some(-0.01), Some(-0.01), None),
             (Some(-0.1), Some(0.2), None),
+            // Better on the whole, but one contradicts the other.
+            (Some(-0.3), Some(0.1), None),
+            (Some(-0.3), Some(0.01), Some(0.145)),
             // A single training log, and no log apart.
             (None, Some(-0.1), Some(0.1)),
             (None, None, None),

@@ -77,6 +77,9 @@ impl<'a> Searched<'a> {
 
     /// Plainer models in place of the chosen one, as long as they predict whole logs better.
     fn plainest(mut self, apart: &[Log], watch: &dyn Watch) -> Self {
+        if (self.left.as_ref()).is_some_and(|left| !left.is_significant()) {
+            self.chosen.unmasked = self.chosen.named().cloned().collect();
+        }
         while let Some(plainer) = self.plainer(apart, watch) {
             self = plainer;
         }
@@ -108,6 +111,7 @@ impl<'a> Searched<'a> {
         };
         let chosen = Chosen {
             unused: [self.chosen.unused.clone(), unused].concat(),
+            unmasked: self.chosen.unmasked.clone(),
             ..establish(problem, fitted, selected, watch)
         };
         Self {
