@@ -82,10 +82,12 @@ pub(super) fn plainer(
     }
     let settings = &problem.settings.select;
     let least = LeftOut::of(problem, after, apart);
-    let differs = |other: &&Fitted| !has_same_effects(other, after);
+    // A whole model that took the place of the chosen one and then lost an idle effect must not return with it.
+    let is_first = (chosen.unused.iter()).all(|unused| unused.effect.is_some());
+    let is_new = |other: &&Fitted| is_first && !has_same_effects(other, after);
     let friction = problem.with_usual_friction();
-    let friction = friction.as_ref().filter(differs);
-    let usual = chosen.usual.as_ref().filter(differs);
+    let friction = friction.as_ref().filter(is_new);
+    let usual = chosen.usual.as_ref().filter(is_new);
     let whole = |fitted, of| Other {
         fitted,
         unused: None,
