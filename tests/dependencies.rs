@@ -236,12 +236,13 @@ fn every_crate_that_a_manifest_names_has_a_true_row() {
 fn every_python_package_that_the_wheel_names_has_a_row() {
     let path = ours("python/pyproject.toml");
     let project: toml::Table = fs::read_to_string(path).unwrap().parse().unwrap();
+    let extras = project["project"]["optional-dependencies"].as_table();
     let lists = [
         &project["build-system"]["requires"],
         &project["project"]["dependencies"],
-        &project["project"]["optional-dependencies"]["environment"],
     ];
-    let asked = lists.iter().flat_map(|list| list.as_array().unwrap());
+    let lists = lists.into_iter().chain(extras.unwrap().values());
+    let asked = lists.flat_map(|list| list.as_array().unwrap());
     let named: BTreeSet<&str> = asked
         .map(|one| {
             one.as_str()

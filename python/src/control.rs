@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use residyn::Library;
 use residyn::read_plant;
 use residyn_control::control::{
-    Episode as Played, EpisodeError, Predictor, Task, episode, with_controller,
+    Episode as Played, EpisodeError, Predictor, Simulated, Task, episode, with_controller,
 };
 use residyn_core::plant::Plant;
 use residyn_core::streams::{Purpose, stream};
@@ -103,7 +103,11 @@ impl Question {
         let mut rig = task.rig(plant, &dynamics, &start);
         let draws = stream(*seed, Purpose::JudgePlan(number));
         with_controller(predictor, task, task.replan, &draws, |controller| {
-            episode(task, &mut rig, controller, &mut rng)
+            let mut plant = Simulated {
+                rig: &mut rig,
+                noise: &mut rng,
+            };
+            episode(task, &mut plant, controller)
         })
     }
 }

@@ -1,42 +1,49 @@
 use std::fmt::Write;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{self, Source};
 use super::{Answer, Common, progress, terminal};
+use rand::{Rng, RngExt};
 use residyn_control::control::{
-    Controller, Episode, Policy, Predictor, Task, episode, with_controller,
+    Controller, Episode, Policy, Predictor, Simulated, Task, episode, with_controller,
 };
 use residyn_control::plan::Method;
 use residyn_core::data::statistics::{mean, sample_deviation};
 use residyn_core::data::{Joint, Log};
-use residyn_core::model::Library;
+use residyn_core::model::{Library, Model};
 use residyn_core::plant::{Noise, Plant};
 use residyn_core::streams::{Purpose, stream};
 use residyn_io::files::write_whole;
 use residyn_io::read_model;
 use residyn_io::runs::RunFolder;
 use residyn_io::{read_plant, write_log};
+use residyn_plants::{Address, AddressError, Clock, Description, Remote};
 use residyn_plot::{JointKind, Panel, PlotError, Role, Track, predictions};
 use residyn_train::Checkpoint;
 
-/// Control a simulated plant by model-predictive control with any model
+/// Control a plant by model-predictive control with any model
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  residyn control --model pendulum --plant pendulum-real --episodes 3 --out episodes\n  \
-                  residyn control --checkpoint checkpoints/pendulum-sim --plant pendulum-sim"
+                  residyn control --checkpoint checkpoints/pendulum-sim --plant pendulum-sim\n  \
+                  residyn control --model pendulum --plant exec:\"python -m residyn.plants.mujoco rig.xml --step 0.05\""
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
     model: inputs::ModelArguments,
-    /// Plant file, model file, or the name of a built-in plant or system
+    /// Plant file, model file, or the name of a built-in plant or system; or a plant in another process, exec:COMMAND or
+    /// tcp:HOST:PORT
     #[arg(long, value_name = "NAME")]
     plant: PathBuf,
+    /// Connect to a tcp: plant on another machine, over a network that nothing protects
+    #[arg(long)]
+    plant_elsewhere: bool,
     /// Task file, or the name of a built-in task; by default a built-in one of the plant's system
     #[arg(long, value_name = "FILE")]
     task: Option<PathBuf>,
@@ -96,6 +103,9 @@ struct Entry {
     /// When plans were made whose candidates all diverged, in s.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lost_s: Vec<f64>,
+    /// Periods of a plant on the wall clock that passed before a command was ready.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    late: Option<usize>,
     /// With an output folder.
     #[serde(flatten)]
     files: Option<Files>,
@@ -109,18 +119,15 @@ struct Files {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
-    let plant = read_plant(&arguments.plant, &library)?;
-    let task = task(arguments, &plant)?;
+    let mut plant = Controlled::named(arguments, &library)?;
+    let task = task(arguments, &library, &plant)?;
     let predictor = predictor(arguments, &library, &task)?;
-    if predictor.joints() != task.joints() {
-        bail!(
-            "the model {} has {} joints, but the plant {} has {}; plan with a model of the plant's system",
-            predictor.system(),
-            predictor.joints(),
-            plant.system.name,
-            task.joints()
-        );
-    }
+    same_joints(
+        predictor.system(),
+        predictor.joints(),
+        plant.name(),
+        task.joints(),
+    )?;
     let _folder = arguments.out.as_deref().map(RunFolder::open).transpose()?;
     if let Some(out) = &arguments.out {
         std::fs::create_dir_all(out)
@@ -131,7 +138,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let bar = progress::bar(count);
     let mut entries = Vec::new();
     for number in 0..count {
-        entries.push(one(arguments, &plant, &task, &predictor, number)?);
+        entries.push(one(arguments, &mut plant, &task, &predictor, number)?);
         bar.inc(1);
         bar.set_message("episodes");
     }
@@ -165,8 +172,21 @@ fn lost_message(episodes: &[Entry]) -> bool {
 }
 
 /// The task, with the settings of the command line.
-fn task(arguments: &Arguments, plant: &Plant) -> Result<Task> {
-    let mut task = Task::for_plant(plant, arguments.task.as_deref())?;
+fn task(arguments: &Arguments, library: &Library, plant: &Controlled) -> Result<Task> {
+    let given = arguments.task.as_deref();
+    let mut task = match plant {
+        Controlled::Simulated(plant) => Task::for_plant(plant, given)?,
+        Controlled::Elsewhere(remote) => {
+            let system = planned_system(arguments, library)?;
+            same_joints(
+                &system.name,
+                system.joints,
+                plant.name(),
+                remote.description().joints.len(),
+            )?;
+            Task::for_system(&system.name, system.joints, given)?
+        }
+    };
     let Arguments {
         replan,
         method,
@@ -194,8 +214,56 @@ fn task(arguments: &Arguments, plant: &Plant) -> Result<Task> {
             velocity: *velocity,
         };
     }
-    task.check_for(plant.system.joints)?;
+    if let Controlled::Elsewhere(remote) = plant {
+        within(&mut task, remote.description())?;
+    }
+    task.check_for(task.joints())?;
     Ok(task)
+}
+
+/// The system that the plans are for.
+fn planned_system(arguments: &Arguments, library: &Library) -> Result<Model> {
+    Ok(match arguments.model.source() {
+        Source::Checkpoint(dir) => {
+            let (_, declared, _) = Checkpoint::open(dir, library, arguments.common.device)?;
+            declared
+        }
+        Source::File(file) => read_model(file, library)?,
+    })
+}
+
+fn same_joints(model: &str, own: usize, plant: &str, joints: usize) -> Result<()> {
+    if own != joints {
+        bail!(
+            "the model {model} has {own} joints, but the plant {plant} has {joints}; plan with a model of the plant's system"
+        );
+    }
+    Ok(())
+}
+
+/// A task within the limits of a plant in another process.
+fn within(task: &mut Task, plant: &Description) -> Result<()> {
+    if (task.step_s - plant.step_s).abs() > 1e-9 * task.step_s {
+        bail!(
+            "the task {} holds a command for {} s, the plant {} for {} s; let them agree",
+            task.name(),
+            task.step_s,
+            plant.name,
+            plant.step_s
+        );
+    }
+    let limits = task.torque.iter_mut().zip(&plant.limits.command);
+    for (joint, (planned, [low, high])) in (1..).zip(limits) {
+        *planned = [planned[0].max(*low), planned[1].min(*high)];
+        if !(planned[0] < planned[1]) {
+            bail!(
+                "the plant {} takes commands from {low} to {high} on joint {joint}, and the task {} plans none of them",
+                plant.name,
+                task.name()
+            );
+        }
+    }
+    Ok(())
 }
 
 fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Predictor> {
@@ -216,29 +284,32 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
 
 fn one(
     arguments: &Arguments,
-    plant: &Plant,
+    plant: &mut Controlled,
     task: &Task,
     predictor: &Predictor,
     number: usize,
 ) -> Result<Entry> {
     let seed = arguments.common.seed;
     let mut rng = stream(seed, Purpose::Judge(number));
-    let dynamics = plant.dynamics();
     let start = task.draw_start(&mut rng);
-    let mut rig = task.rig(plant, &dynamics, &start);
+    let log = (arguments.out.as_deref()).map(|out| out.join(format!("episode-{number:03}.csv")));
     let draws = stream(seed, Purpose::JudgePlan(number));
     with_controller(predictor, task, task.replan, &draws, |controller| {
         let mut timed = Timed {
             controller,
             deciding: Duration::ZERO,
         };
-        let episode = episode(task, &mut rig, &mut timed, &mut rng)?;
+        let episode = plant.episode(task, &start, &mut timed, &mut rng, log.as_deref())?;
         let Timed {
             controller,
             deciding,
         } = timed;
         let decisions = controller.decisions();
-        let files = written(arguments, plant, task, &episode, number)?;
+        let late = plant.late();
+        let files = match log {
+            Some(log) => Some(written(arguments, plant, task, &episode, log)?),
+            None => None,
+        };
         Ok(Entry {
             total: episode.total(),
             success: episode.success,
@@ -246,25 +317,24 @@ fn one(
             ms_per_decision: 1e3 * deciding.as_secs_f64() / decisions as f64,
             diverged: controller.diverged(),
             lost_s: controller.lost().to_vec(),
+            late,
             files,
         })
     })
 }
 
-/// Write the episode if an output folder is given.
+/// Write an episode and its plot; a plant in another process has written its log already.
 fn written(
     arguments: &Arguments,
-    plant: &Plant,
+    plant: &Controlled,
     task: &Task,
     episode: &Episode,
-    number: usize,
-) -> Result<Option<Files>> {
-    let Some(out) = &arguments.out else {
-        return Ok(None);
-    };
-    let name = |ending: &str| out.join(format!("episode-{number:03}.{ending}"));
-    let [log, plot] = ["csv", "svg"].map(name);
-    write_log(&episode.stretch.log, &log)?;
+    log: PathBuf,
+) -> Result<Files> {
+    if matches!(plant, Controlled::Simulated(_)) {
+        write_log(&episode.stretch.log, &log)?;
+    }
+    let plot = log.with_extension("svg");
     let title = format!(
         "{} on {}: return {:.1}",
         task.name(),
@@ -275,15 +345,15 @@ fn written(
         &plot,
         positions(plant, &episode.stretch.log, &title)?.as_bytes(),
     )?;
-    Ok(Some(Files { log, plot }))
+    Ok(Files { log, plot })
 }
 
 /// The joints' positions over time, as SVG text.
-fn positions(plant: &Plant, log: &Log, title: &str) -> Result<String, PlotError> {
+fn positions(plant: &Controlled, log: &Log, title: &str) -> Result<String, PlotError> {
     let points = |joint: Joint| log.time.iter().copied().zip(log.q[joint].iter().copied());
     let panel = |joint: Joint| Panel {
-        label: plant.system.joint_label(joint),
-        quantity: JointKind::of(plant.system.prismatic[joint]).position(joint),
+        label: plant.joint_label(joint),
+        quantity: plant.joint_kind(joint).position(joint),
         tracks: vec![Track {
             label: "measured".to_owned(),
             role: Role::Measured,
@@ -292,6 +362,92 @@ fn positions(plant: &Plant, log: &Log, title: &str) -> Result<String, PlotError>
     };
     let panels: Vec<Panel> = Joint::all(log.q.len()).map(panel).collect();
     predictions(&panels, title)
+}
+
+/// What is controlled.
+enum Controlled {
+    Simulated(Box<Plant>),
+    Elsewhere(Box<Remote>),
+}
+
+impl Controlled {
+    fn named(arguments: &Arguments, library: &Library) -> Result<Self> {
+        let Arguments {
+            plant,
+            plant_elsewhere,
+            ..
+        } = arguments;
+        let Some(address) = Address::in_text(plant, *plant_elsewhere) else {
+            return Ok(Self::Simulated(Box::new(read_plant(plant, library)?)));
+        };
+        let address = address.map_err(|error| match error {
+            AddressError::OtherMachine(_) => {
+                anyhow!("{error}: use a tunnel, or --plant-elsewhere")
+            }
+            _ => error.into(),
+        })?;
+        let program = concat!("residyn ", env!("CARGO_PKG_VERSION"));
+        Ok(Self::Elsewhere(Box::new(Remote::open(&address, program)?)))
+    }
+
+    fn name(&self) -> &str {
+        match self {
+            Self::Simulated(plant) => &plant.system.name,
+            Self::Elsewhere(remote) => &remote.description().name,
+        }
+    }
+
+    fn joint_label(&self, joint: Joint) -> String {
+        match self {
+            Self::Simulated(plant) => plant.system.joint_label(joint),
+            Self::Elsewhere(remote) => remote.description().joints[joint.index()].clone(),
+        }
+    }
+
+    fn joint_kind(&self, joint: Joint) -> JointKind {
+        JointKind::of(match self {
+            Self::Simulated(plant) => plant.system.prismatic[joint],
+            // It does not say so.
+            Self::Elsewhere(_) => false,
+        })
+    }
+
+    /// An episode from `start`, where the plant can be put somewhere; one in another process is kept in `log` row by row.
+    fn episode(
+        &mut self,
+        task: &Task,
+        start: &[f64],
+        policy: &mut dyn Policy,
+        rng: &mut impl Rng,
+        log: Option<&Path>,
+    ) -> Result<Episode> {
+        match self {
+            Self::Simulated(plant) => {
+                let dynamics = plant.dynamics();
+                let mut rig = task.rig(plant, &dynamics, start);
+                let (rig, noise) = (&mut rig, rng);
+                Ok(episode(task, &mut Simulated { rig, noise }, policy)?)
+            }
+            Self::Elsewhere(remote) => {
+                let is_simulated = remote.description().clock == Clock::Simulated;
+                let seed = rng.random_range(0..1 << 53);
+                remote.begin(seed, is_simulated.then_some(start), log)?;
+                let episode = episode(task, remote.as_mut(), policy);
+                remote.end()?;
+                Ok(episode?)
+            }
+        }
+    }
+
+    /// How often a plant that does not wait had to go on without a command.
+    fn late(&self) -> Option<usize> {
+        match self {
+            Self::Elsewhere(remote) if remote.description().clock == Clock::Wall => {
+                Some(remote.lateness().late)
+            }
+            _ => None,
+        }
+    }
 }
 
 /// A controller that measures the time of its decisions.

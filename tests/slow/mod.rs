@@ -12,6 +12,7 @@ mod large_inputs;
 mod measured;
 mod network;
 mod page;
+mod plants;
 mod properties;
 mod recordings;
 mod several_effects;

@@ -1,10 +1,8 @@
-use rand::Rng;
 use thiserror::Error;
 
-use super::{Policy, Task};
+use super::{DriveError, Driven, Policy, Task};
 use crate::plan::Objective;
 use residyn_core::data::Log;
-use residyn_core::plant::{PlantError, Rig};
 
 /// Consecutive steps of a rig under a policy.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +27,7 @@ pub struct Episode {
 #[derive(Debug, Error)]
 pub enum EpisodeError {
     #[error("{0}")]
-    Rig(#[from] PlantError),
+    Drive(#[from] DriveError),
     #[error(
         "the {what} of the task is {value} in the state at {time_s:.3} s, {state:?}; give a formula that is finite there"
     )]
@@ -41,43 +39,41 @@ pub enum EpisodeError {
     },
 }
 
-/// Drive the rig by `policy` for `steps` steps.
+/// Drive a plant by `policy` for `steps` steps.
 ///
 /// # Errors
-/// A rig that diverges.
+/// As [`Driven::step`].
 pub fn drive(
-    rig: &mut Rig<'_>,
+    plant: &mut dyn Driven,
     policy: &mut dyn Policy,
     steps: usize,
-    rng: &mut impl Rng,
-) -> Result<Stretch, PlantError> {
+) -> Result<Stretch, DriveError> {
     let mut stretch = Stretch {
-        log: rig.empty_log(),
+        log: plant.empty_log(),
         states: Vec::new(),
     };
     for _ in 0..steps {
-        let (measured, time_s) = (rig.measure(rng), rig.time_s());
-        let tau = policy.torque(&measured, time_s);
-        stretch.push(rig, &measured, &tau);
-        rig.step(&tau)?;
+        let row = Row::of(plant);
+        let command = policy.torque(&row.measured, row.time_s);
+        let sent = plant.step(&command)?;
+        stretch.push(row, &sent);
     }
     // No command in the last row.
-    let (measured, idle) = (rig.measure(rng), vec![0.0; stretch.log.joints()]);
-    stretch.push(rig, &measured, &idle);
+    let (row, idle) = (Row::of(plant), vec![0.0; stretch.log.joints()]);
+    stretch.push(row, &idle);
     Ok(stretch)
 }
 
-/// A whole episode of `task` from the rig's current state.
+/// A whole episode of `task` from the plant's current state.
 ///
 /// # Errors
-/// A rig that diverges, and a reward or goal that is not finite.
+/// As [`Driven::step`], and a reward or goal that is not finite.
 pub fn episode(
     task: &Task,
-    rig: &mut Rig<'_>,
+    plant: &mut dyn Driven,
     policy: &mut dyn Policy,
-    rng: &mut impl Rng,
 ) -> Result<Episode, EpisodeError> {
-    let stretch = drive(rig, policy, task.steps, rng)?;
+    let stretch = drive(plant, policy, task.steps)?;
     let rewards = stretch.values("objective", &task.objective())?;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates
     let held = (task.goal.hold_s / task.step_s).round() as usize;
@@ -90,15 +86,32 @@ pub fn episode(
     })
 }
 
+/// A plant at the beginning of a step.
+struct Row {
+    time_s: f64,
+    measured: Vec<f64>,
+    state: Vec<f64>,
+}
+
+impl Row {
+    fn of(plant: &mut dyn Driven) -> Self {
+        Self {
+            measured: plant.measure(),
+            time_s: plant.time_s(),
+            state: plant.state().to_vec(),
+        }
+    }
+}
+
 impl Stretch {
-    fn push(&mut self, rig: &Rig<'_>, measured: &[f64], tau: &[f64]) {
+    fn push(&mut self, row: Row, tau: &[f64]) {
         let log = &mut self.log;
-        log.time.push(rig.time_s());
+        log.time.push(row.time_s);
         let channels = log.q.iter_mut().chain(&mut log.qd).chain(&mut log.tau);
-        for (channel, value) in channels.zip(measured.iter().chain(tau)) {
+        for (channel, value) in channels.zip(row.measured.iter().chain(tau)) {
             channel.push(*value);
         }
-        self.states.push(rig.state().to_vec());
+        self.states.push(row.state);
     }
 
     /// The values of a formula after each step.

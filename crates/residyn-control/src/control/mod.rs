@@ -1,12 +1,14 @@
-//! Model-predictive control of a simulated plant: tasks, the controller that plans with a model, and episodes.
+//! Model-predictive control of a plant: tasks, the controller that plans with a model, and episodes.
 
 mod controller;
+mod driven;
 mod episode;
 mod predictor;
 mod session;
 mod task;
 
 pub use controller::{Controller, LostPlan, Policy, RandomTorque};
+pub use driven::{DriveError, Driven, Simulated};
 pub use episode::{Episode, EpisodeError, Stretch, drive, episode};
 pub use predictor::Predictor;
 pub use session::with_controller;

@@ -143,25 +143,32 @@ impl Task {
             .max_by_key(|task| task.planner.horizon)
     }
 
-    /// A task for a plant: from a file, or the embedded one of this name; without a name, the task of the plant's
+    /// A task for a plant, as [`Task::for_system`].
+    ///
+    /// # Errors
+    /// As [`Task::for_system`].
+    pub fn for_plant(plant: &Plant, given: Option<&Path>) -> Result<Self, NoTask> {
+        Self::for_system(&plant.system.name, plant.system.joints, given)
+    }
+
+    /// A task for a system: from a file, or the embedded one of this name; without a name, the embedded task of the
     /// system.
     ///
     /// # Errors
-    /// As [`Task::read`]; no task for the plant's system, or a task for another system.
-    pub fn for_plant(plant: &Plant, given: Option<&Path>) -> Result<Self, NoTask> {
-        let system = &plant.system.name;
+    /// As [`Task::read`]; no task for the system, or a task for another one.
+    pub fn for_system(system: &str, joints: usize, given: Option<&Path>) -> Result<Self, NoTask> {
         let of_system = || {
             Self::of_system(system).ok_or_else(|| NoTask::None {
-                system: system.clone(),
+                system: system.to_owned(),
                 built_in: Self::names().join(", "),
             })
         };
         let task = given.map_or_else(of_system, |path| Ok(Self::read(path)?))?;
-        match task.system == *system && task.joints() == plant.system.joints {
+        match task.system == *system && task.joints() == joints {
             true => Ok(task),
             false => Err(NoTask::OtherSystem {
                 task: task.name(),
-                system: system.clone(),
+                system: system.to_owned(),
                 of: task.system,
             }),
         }

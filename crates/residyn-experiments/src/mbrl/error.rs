@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-use residyn_control::control::{EpisodeError, LostPlan};
+use residyn_control::control::{DriveError, EpisodeError, LostPlan};
 use residyn_core::data::LogError;
 use residyn_core::plant::PlantError;
 use residyn_io::WriteLogError;
@@ -12,6 +12,8 @@ use residyn_train::{CheckpointError, HybridError, SegmentsError, TrainError};
 pub enum RunError {
     #[error("{0}")]
     Plant(#[from] PlantError),
+    #[error("{0}")]
+    Drive(#[from] DriveError),
     #[error("{0}")]
     Episode(#[from] EpisodeError),
     #[error("{0}")]

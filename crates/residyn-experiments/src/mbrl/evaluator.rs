@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::RunError;
-use residyn_control::control::{Episode, Predictor, Task, episode, with_controller};
+use residyn_control::control::{Episode, Predictor, Simulated, Task, episode, with_controller};
 use residyn_core::plant::Plant;
 use residyn_core::streams::{Purpose, stream};
 
@@ -55,7 +55,11 @@ impl Evaluator<'_> {
         let mut rig = self.task.rig(self.plant, &dynamics, &start);
         let draws = stream(self.seed, Purpose::JudgePlan(0));
         with_controller(predictor, self.task, replan, &draws, |controller| {
-            let episode = episode(self.task, &mut rig, controller, &mut rng)?;
+            let mut plant = Simulated {
+                rig: &mut rig,
+                noise: &mut rng,
+            };
+            let episode = episode(self.task, &mut plant, controller)?;
             controller.check()?;
             Ok((episode, controller.diverged()))
         })

@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{EpisodeScore, Evaluator, Learner, RunError, transitions};
-use residyn_control::control::{Predictor, RandomTorque, Task, drive, with_controller};
+use residyn_control::control::{Predictor, RandomTorque, Simulated, Task, drive, with_controller};
 use residyn_core::data::Log;
 use residyn_core::model::Dynamics;
 use residyn_core::plant::{Plant, Rig};
@@ -67,7 +67,11 @@ impl Run<'_> {
         let mut rig = self.rig(&dynamics, 0);
         let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random(0)));
         let mut noise = stream(self.seed, Purpose::Gather(0));
-        let stretch = drive(&mut rig, &mut random, self.schedule.random, &mut noise)?;
+        let mut plant = Simulated {
+            rig: &mut rig,
+            noise: &mut noise,
+        };
+        let stretch = drive(&mut plant, &mut random, self.schedule.random)?;
         Ok(RunState {
             logs: vec![stretch.log],
             ..RunState::default()
@@ -122,7 +126,11 @@ impl Run<'_> {
             self.task.replan,
             &draws,
             |controller| {
-                let stretch = drive(&mut rig, controller, steps, &mut noise)?;
+                let mut plant = Simulated {
+                    rig: &mut rig,
+                    noise: &mut noise,
+                };
+                let stretch = drive(&mut plant, controller, steps)?;
                 controller.check()?;
                 Ok(stretch.log)
             },

@@ -1,0 +1,291 @@
+use std::collections::VecDeque;
+use std::path::Path;
+use std::time::Duration;
+
+use residyn_control::control::{DriveError, Driven};
+use residyn_core::data::Log;
+
+use super::address::Address;
+use super::description::{Clock, Description};
+use super::error::RemoteError;
+use super::guard::Guard;
+use super::message::{FromPlant, PROTOCOL, Row, ToPlant};
+use super::recorder::Recorder;
+use super::wire::Wire;
+
+/// A plant may have to load much before it says hello.
+const GREETING: Duration = Duration::from_secs(60);
+/// A rig may have to swing out before an episode.
+const RESETTING: Duration = Duration::from_secs(300);
+/// A step of a slow simulator.
+const STEPPING: Duration = Duration::from_secs(30);
+/// Commands that are remembered until rows say when they acted.
+const REMEMBERED: usize = 4096;
+
+/// A plant in another process, from its hello on.
+pub struct Remote {
+    wire: Wire,
+    description: Description,
+    episode: Option<Episode>,
+    lateness: Lateness,
+}
+
+/// How late commands came on the wall clock.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Lateness {
+    /// Commands that were sent.
+    pub commands: usize,
+    /// Periods that passed before a command was ready.
+    pub late: usize,
+}
+
+struct Episode {
+    guard: Guard,
+    row: Row,
+    /// Positions, then velocities.
+    state: Vec<f64>,
+    safe: Vec<f64>,
+    /// Ids and commands that may still be in force.
+    sent: VecDeque<(u64, Vec<f64>)>,
+    id: u64,
+    recorder: Option<Recorder>,
+}
+
+impl Remote {
+    /// Start a plant or connect to it, and exchange hellos. `program` says who asks.
+    ///
+    /// # Errors
+    /// A plant that cannot be reached, or whose hello is wrong.
+    pub fn open(address: &Address, program: &str) -> Result<Self, RemoteError> {
+        let mut wire = Wire::open(address)?;
+        wire.send(&ToPlant::Hello {
+            protocol: PROTOCOL,
+            program,
+        })?;
+        let hello = match wire.receive(GREETING)? {
+            FromPlant::Hello(hello) => *hello,
+            _ => return Err(refused(&wire, "the first message is a hello".into())),
+        };
+        if hello.protocol != PROTOCOL {
+            let fault = format!("it speaks protocol {}, not {PROTOCOL}", hello.protocol);
+            return Err(refused(&wire, fault));
+        }
+        if let Some(fault) = hello.description.fault() {
+            return Err(refused(&wire, fault));
+        }
+        Ok(Self {
+            wire,
+            description: hello.description,
+            episode: None,
+            lateness: Lateness::default(),
+        })
+    }
+
+    /// What the plant says of itself.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Begin an episode from `start` (positions, then velocities) or from where the plant likes, and keep its rows in
+    /// the log at `path`.
+    ///
+    /// # Errors
+    /// A plant that refuses, is silent or breaks the protocol; a file that cannot be made.
+    pub fn begin(
+        &mut self,
+        seed: u64,
+        start: Option<&[f64]>,
+        path: Option<&Path>,
+    ) -> Result<(), RemoteError> {
+        let last_s = self.episode.as_ref().map(|episode| episode.row.time);
+        self.end()?;
+        self.wire.send(&ToPlant::Reset { seed, start })?;
+        let joints = self.description.joints.len();
+        // Rows of the episode before may still be on their way from a plant on the wall clock.
+        let is_before = |row: &Row| last_s.is_some_and(|last_s| row.time > last_s);
+        let row = loop {
+            let rows = self.rows(RESETTING)?;
+            if let Some(row) = rows.into_iter().next().filter(|row| !is_before(row)) {
+                break row;
+            }
+        };
+        if let Some(fault) = row.fault(joints, None) {
+            return Err(refused(&self.wire, fault));
+        }
+        let recorder = path.map(|path| Recorder::create(path, &self.description));
+        let mut episode = Episode {
+            guard: Guard::new(&self.description, &row.q),
+            state: Vec::new(),
+            safe: self.description.safe.clone(),
+            sent: VecDeque::new(),
+            id: 0,
+            recorder: recorder.transpose()?,
+            row: Row {
+                time: f64::NEG_INFINITY,
+                ..row.clone()
+            },
+        };
+        episode.take(row)?;
+        self.episode = Some(episode);
+        self.lateness = Lateness::default();
+        Ok(())
+    }
+
+    /// How late the commands of the newest episode came.
+    pub fn lateness(&self) -> Lateness {
+        self.lateness
+    }
+
+    /// End the episode; the plant stays as it is until it begins another or is closed.
+    ///
+    /// # Errors
+    /// A log that cannot be written.
+    pub fn end(&mut self) -> Result<(), RemoteError> {
+        let Some(mut episode) = self.episode.take() else {
+            return Ok(());
+        };
+        if let Some(recorder) = &mut episode.recorder {
+            recorder.end(&self.description.safe)?;
+        }
+        Ok(())
+    }
+
+    fn send_step(&mut self, command: &[f64]) -> Result<Vec<f64>, RemoteError> {
+        if let Some(joint) = command.iter().position(|value| !value.is_finite()) {
+            let value = command[joint];
+            self.wire.close();
+            return Err(RemoteError::Command {
+                joint: joint + 1,
+                value,
+            });
+        }
+        self.catch_up()?;
+        let episode = self.episode.as_mut().expect("it has begun");
+        let (q, qd) = episode.state.split_at(command.len());
+        let sent = episode.guard.admit(command, q, qd);
+        episode.id += 1;
+        let id = episode.id;
+        self.wire.send(&ToPlant::Step { id, command: &sent })?;
+        episode.sent.push_back((id, sent.clone()));
+        if episode.sent.len() > REMEMBERED {
+            episode.sent.pop_front();
+        }
+        self.lateness.commands += 1;
+        self.await_rows(id)?;
+        Ok(sent)
+    }
+
+    /// Rows that came while the command was computed: the plant did not wait.
+    fn catch_up(&mut self) -> Result<(), RemoteError> {
+        while let Some(message) = self.wire.waiting()? {
+            if self.description.clock == Clock::Simulated {
+                let fault = "nothing was asked since its last answer".to_owned();
+                return Err(refused(&self.wire, fault));
+            }
+            let rows = self.rows_in(message)?;
+            self.take(rows)?;
+            self.lateness.late += 1;
+        }
+        Ok(())
+    }
+
+    fn await_rows(&mut self, id: u64) -> Result<(), RemoteError> {
+        let rows = self.rows(STEPPING)?;
+        let acted = rows.last().map(|row| row.command);
+        if self.description.clock == Clock::Simulated && acted != Some(id) {
+            let fault = format!("the answer to step {id} ends with a row of command {acted:?}");
+            return Err(refused(&self.wire, fault));
+        }
+        self.take(rows)
+    }
+
+    fn take(&mut self, rows: Vec<Row>) -> Result<(), RemoteError> {
+        let joints = self.description.joints.len();
+        let episode = self.episode.as_mut().expect("it has begun");
+        for row in rows {
+            let fault = row.fault(joints, Some(episode.row.time));
+            let fault = fault.or_else(|| episode.fault_of_id(row.command));
+            if let Some(fault) = fault {
+                return Err(refused(&self.wire, fault));
+            }
+            episode.take(row)?;
+        }
+        Ok(())
+    }
+
+    fn rows(&mut self, patience: Duration) -> Result<Vec<Row>, RemoteError> {
+        let message = self.wire.receive(patience)?;
+        self.rows_in(message)
+    }
+
+    fn rows_in(&self, message: FromPlant) -> Result<Vec<Row>, RemoteError> {
+        match message {
+            FromPlant::Rows { rows } if !rows.is_empty() => Ok(rows),
+            FromPlant::Rows { .. } => Err(refused(&self.wire, "`rows` is empty".into())),
+            _ => Err(refused(&self.wire, "rows were expected".into())),
+        }
+    }
+}
+
+impl Episode {
+    fn fault_of_id(&self, id: u64) -> Option<String> {
+        let is_known = self.sent.iter().any(|(sent, _)| *sent == id);
+        (!is_known && id != 0).then(|| format!("command {id} was not sent"))
+    }
+
+    /// A row that is right.
+    fn take(&mut self, row: Row) -> Result<(), RemoteError> {
+        let apart_s = row.time - self.row.time;
+        let speeds = row.qd.clone().unwrap_or_else(|| {
+            let moved = row.q.iter().zip(&self.row.q);
+            moved.map(|(now, then)| (now - then) / apart_s).collect()
+        });
+        // Ids grow: what was sent before the command that acted is over.
+        while row.command > 0 && self.sent.front().is_some_and(|(id, _)| *id < row.command) {
+            self.sent.pop_front();
+        }
+        let acted = self.sent.front().filter(|(id, _)| *id == row.command);
+        let acted = acted.map_or(&self.safe, |(_, command)| command);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.row(&row, &speeds, acted)?;
+        }
+        self.state = [row.q.as_slice(), &speeds].concat();
+        self.row = row;
+        Ok(())
+    }
+}
+
+impl Driven for Remote {
+    fn empty_log(&self) -> Log {
+        Log {
+            driven_by: self.description.command.quantity(),
+            ..Log::empty(self.description.joints.len())
+        }
+    }
+
+    fn time_s(&self) -> f64 {
+        self.episode
+            .as_ref()
+            .map_or(0.0, |episode| episode.row.time)
+    }
+
+    fn measure(&mut self) -> Vec<f64> {
+        self.state().to_vec()
+    }
+
+    fn state(&self) -> &[f64] {
+        let episode = self.episode.as_ref();
+        &episode.expect("a plant is driven in an episode").state
+    }
+
+    fn step(&mut self, command: &[f64]) -> Result<Vec<f64>, DriveError> {
+        Ok(self.send_step(command)?)
+    }
+}
+
+fn refused(wire: &Wire, fault: String) -> RemoteError {
+    RemoteError::Refused {
+        line: wire.line(),
+        fault,
+    }
+}
