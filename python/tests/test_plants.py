@@ -738,8 +738,40 @@ hold_s = 1.0
 """
 
 
+# The same rod, which moves by itself.
+FALLING = """
+import math, time
+from residyn.plants import Limits, Plant, Row, serve
+
+class Rod(Plant):
+    name = "rod on the wall clock"
+    joints = ["pivot"]
+    step_s = 0.05
+    clock = "wall"
+    limits = Limits(command=[(-3.0, 3.0)])
+
+    def reset(self, seed, start):
+        self.q, self.qd, self.torque, self.now = math.pi, 0.0, 0.0, time.monotonic()
+        return Row(q=[self.q], qd=[self.qd])
+
+    def step(self, command):
+        while self.now < time.monotonic():
+            self.qd += 1e-3 * (15.0 * math.sin(self.q) + 3.0 * self.torque)
+            self.q += 1e-3 * self.qd
+            self.now += 1e-3
+        self.torque = command[0]
+        return Row(q=[self.q], qd=[self.qd])
+
+serve(Rod())
+"""
+
+
 def controlled(folder: Path, module: str, *more: str) -> dict[str, Any]:
-    plant = f"exec:{sys.executable} -m residyn.plants.{module}"
+    return played(folder, f"-m residyn.plants.{module}", *more)
+
+
+def played(folder: Path, program: str, *more: str) -> dict[str, Any]:
+    plant = f"exec:{sys.executable} {program}"
     done = command("control", "--model", "pendulum", "--plant", plant, "--out", folder / "e", "--json", *more)
     assert done.returncode == 0, done.stderr
     found: dict[str, Any] = json.loads(done.stdout)
@@ -760,3 +792,15 @@ def test_the_program_swings_up_the_pendulum_of_gymnasium(tmp_path: Path) -> None
     task.write_text(SWING_UP)
     found = controlled(tmp_path, "gymnasium Pendulum-v1", "--task", str(task))
     assert found["successes"] == 1, found
+
+
+def test_the_program_controls_a_rod_that_does_not_wait(tmp_path: Path) -> None:
+    task, rod = tmp_path / "task.toml", tmp_path / "rod.py"
+    task.write_text(SWING_UP.replace("steps = 100", "steps = 40"))
+    rod.write_text(FALLING)
+    found = played(tmp_path, f"'{rod}'", "--task", str(task), "--episodes", "2")
+    for number, episode in enumerate(found["episodes"]):
+        # A command acts at the next period at the earliest.
+        assert episode["late"] >= 0 and episode["latency_s"] >= 0.05, found
+        log = residyn.read_log(tmp_path / "e" / f"episode-{number:03}.csv")
+        assert len(log.time) >= 41 and np.all(np.abs(log["tau1"]) <= 2.0)

@@ -8,7 +8,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{self, Source};
-use super::{Answer, Common, progress, terminal};
+use super::{Answer, Common, interrupt, progress, terminal};
 use rand::{Rng, RngExt};
 use residyn_control::control::{
     Controller, Episode, Policy, Predictor, Simulated, Task, episode, with_controller,
@@ -23,7 +23,7 @@ use residyn_io::files::write_whole;
 use residyn_io::read_model;
 use residyn_io::runs::RunFolder;
 use residyn_io::{read_plant, write_log};
-use residyn_plants::{Address, AddressError, Clock, Description, Remote};
+use residyn_plants::{Address, AddressError, Clock, Description, Lateness, Remote};
 use residyn_plot::{JointKind, Panel, PlotError, Role, Track, predictions};
 use residyn_train::Checkpoint;
 
@@ -103,12 +103,21 @@ struct Entry {
     /// When plans were made whose candidates all diverged, in s.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lost_s: Vec<f64>,
-    /// Periods of a plant on the wall clock that passed before a command was ready.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    late: Option<usize>,
+    /// Of a plant on the wall clock.
+    #[serde(flatten)]
+    late: Option<Late>,
     /// With an output folder.
     #[serde(flatten)]
     files: Option<Files>,
+}
+
+/// How late the commands of an episode came.
+#[derive(Serialize)]
+struct Late {
+    /// Periods that passed before a command was ready.
+    late: usize,
+    /// From a row to the beginning of the command that answers it, as a rule.
+    latency_s: f64,
 }
 
 #[derive(Serialize)]
@@ -128,11 +137,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         plant.name(),
         task.joints(),
     )?;
-    let _folder = arguments.out.as_deref().map(RunFolder::open).transpose()?;
+    let folder = arguments.out.as_deref().map(RunFolder::open).transpose()?;
     if let Some(out) = &arguments.out {
         std::fs::create_dir_all(out)
             .with_context(|| format!("{} cannot be made", out.display()))?;
     }
+    // The end of this program is the end of the plant's input, at which it holds its safe command.
+    let _orderly = folder.as_ref().map(|folder| {
+        let path = folder.path().display().to_string();
+        interrupt::orderly(folder, move || format!("{path} keeps the episodes so far"))
+    });
     let count = arguments.episodes.get();
     let begun = Instant::now();
     let bar = progress::bar(count);
@@ -294,6 +308,7 @@ fn one(
     let start = task.draw_start(&mut rng);
     let log = (arguments.out.as_deref()).map(|out| out.join(format!("episode-{number:03}.csv")));
     let draws = stream(seed, Purpose::JudgePlan(number));
+    let predictor = &predictor.clone().acting_after(plant.latency());
     with_controller(predictor, task, task.replan, &draws, |controller| {
         let mut timed = Timed {
             controller,
@@ -305,7 +320,10 @@ fn one(
             deciding,
         } = timed;
         let decisions = controller.decisions();
-        let late = plant.late();
+        let late = plant.lateness().map(|lateness| Late {
+            late: lateness.late,
+            latency_s: lateness.latency() as f64 * task.step_s,
+        });
         let files = match log {
             Some(log) => Some(written(arguments, plant, task, &episode, log)?),
             None => None,
@@ -439,14 +457,19 @@ impl Controlled {
         }
     }
 
-    /// How often a plant that does not wait had to go on without a command.
-    fn late(&self) -> Option<usize> {
+    /// How late commands came to a plant that does not wait.
+    fn lateness(&self) -> Option<&Lateness> {
         match self {
             Self::Elsewhere(remote) if remote.description().clock == Clock::Wall => {
-                Some(remote.lateness().late)
+                Some(remote.lateness())
             }
             _ => None,
         }
+    }
+
+    /// Steps until a command acts, as measured in the episode before.
+    fn latency(&self) -> usize {
+        self.lateness().map_or(0, Lateness::latency)
     }
 }
 
@@ -462,6 +485,10 @@ impl Policy for Timed<'_, '_, '_> {
         let torque = self.controller.torque(measured, time_s);
         self.deciding += began.elapsed();
         torque
+    }
+
+    fn passed(&mut self, steps: usize) {
+        self.controller.passed(steps);
     }
 }
 

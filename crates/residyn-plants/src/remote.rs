@@ -31,12 +31,30 @@ pub struct Remote {
 }
 
 /// How late commands came on the wall clock.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Lateness {
-    /// Commands that were sent.
-    pub commands: usize,
-    /// Periods that passed before a command was ready.
+    /// Periods that passed before a command was ready, over all commands.
     pub late: usize,
+    /// Of each command that acted, the periods from the row that it answers until it did.
+    latencies: Vec<usize>,
+}
+
+impl Lateness {
+    /// Periods until a command acts, as a rule: the median. On the wall clock, where a command acts at the next period at the
+    /// earliest, 1 before any has.
+    pub fn latency(&self) -> usize {
+        let mut latencies = self.latencies.clone();
+        latencies.sort_unstable();
+        latencies.get(latencies.len() / 2).copied().unwrap_or(1)
+    }
+}
+
+struct Sent {
+    id: u64,
+    command: Vec<f64>,
+    /// The period of the row that it answers.
+    answers: usize,
+    has_acted: bool,
 }
 
 struct Episode {
@@ -45,9 +63,13 @@ struct Episode {
     /// Positions, then velocities.
     state: Vec<f64>,
     safe: Vec<f64>,
-    /// Ids and commands that may still be in force.
-    sent: VecDeque<(u64, Vec<f64>)>,
+    /// Commands that may still be in force.
+    sent: VecDeque<Sent>,
     id: u64,
+    /// Messages with rows so far.
+    periods: usize,
+    /// Periods beyond one in the last step.
+    late: usize,
     recorder: Option<Recorder>,
 }
 
@@ -119,6 +141,8 @@ impl Remote {
             safe: self.description.safe.clone(),
             sent: VecDeque::new(),
             id: 0,
+            periods: 0,
+            late: 0,
             recorder: recorder.transpose()?,
             row: Row {
                 time: f64::NEG_INFINITY,
@@ -132,8 +156,8 @@ impl Remote {
     }
 
     /// How late the commands of the newest episode came.
-    pub fn lateness(&self) -> Lateness {
-        self.lateness
+    pub fn lateness(&self) -> &Lateness {
+        &self.lateness
     }
 
     /// End the episode; the plant stays as it is until it begins another or is closed.
@@ -159,6 +183,7 @@ impl Remote {
                 value,
             });
         }
+        let answers = self.episode.as_ref().expect("it has begun").periods;
         self.catch_up()?;
         let episode = self.episode.as_mut().expect("it has begun");
         let (q, qd) = episode.state.split_at(command.len());
@@ -166,12 +191,19 @@ impl Remote {
         episode.id += 1;
         let id = episode.id;
         self.wire.send(&ToPlant::Step { id, command: &sent })?;
-        episode.sent.push_back((id, sent.clone()));
+        episode.sent.push_back(Sent {
+            id,
+            command: sent.clone(),
+            answers,
+            has_acted: false,
+        });
         if episode.sent.len() > REMEMBERED {
             episode.sent.pop_front();
         }
-        self.lateness.commands += 1;
         self.await_rows(id)?;
+        let episode = self.episode.as_mut().expect("it has begun");
+        episode.late = episode.periods - answers - 1;
+        self.lateness.late += episode.late;
         Ok(sent)
     }
 
@@ -184,7 +216,6 @@ impl Remote {
             }
             let rows = self.rows_in(message)?;
             self.take(rows)?;
-            self.lateness.late += 1;
         }
         Ok(())
     }
@@ -202,13 +233,14 @@ impl Remote {
     fn take(&mut self, rows: Vec<Row>) -> Result<(), RemoteError> {
         let joints = self.description.joints.len();
         let episode = self.episode.as_mut().expect("it has begun");
+        episode.periods += 1;
         for row in rows {
             let fault = row.fault(joints, Some(episode.row.time));
             let fault = fault.or_else(|| episode.fault_of_id(row.command));
             if let Some(fault) = fault {
                 return Err(refused(&self.wire, fault));
             }
-            episode.take(row)?;
+            self.lateness.latencies.extend(episode.take(row)?);
         }
         Ok(())
     }
@@ -229,29 +261,37 @@ impl Remote {
 
 impl Episode {
     fn fault_of_id(&self, id: u64) -> Option<String> {
-        let is_known = self.sent.iter().any(|(sent, _)| *sent == id);
+        let is_known = self.sent.iter().any(|sent| sent.id == id);
         (!is_known && id != 0).then(|| format!("command {id} was not sent"))
     }
 
-    /// A row that is right.
-    fn take(&mut self, row: Row) -> Result<(), RemoteError> {
+    /// A row that is right. Returns the latency of the command that acted up to it, if it is the first such row.
+    fn take(&mut self, row: Row) -> Result<Option<usize>, RemoteError> {
         let apart_s = row.time - self.row.time;
         let speeds = row.qd.clone().unwrap_or_else(|| {
             let moved = row.q.iter().zip(&self.row.q);
             moved.map(|(now, then)| (now - then) / apart_s).collect()
         });
         // Ids grow: what was sent before the command that acted is over.
-        while row.command > 0 && self.sent.front().is_some_and(|(id, _)| *id < row.command) {
+        let is_over = |sent: &Sent| sent.id < row.command;
+        while row.command > 0 && self.sent.front().is_some_and(is_over) {
             self.sent.pop_front();
         }
-        let acted = self.sent.front().filter(|(id, _)| *id == row.command);
-        let acted = acted.map_or(&self.safe, |(_, command)| command);
+        let acted = self.sent.front_mut();
+        let mut acted = acted.filter(|sent| sent.id == row.command);
+        let first = acted.as_mut().filter(|sent| !sent.has_acted);
+        // It acted from the row before on.
+        let latency = first.map(|sent| {
+            sent.has_acted = true;
+            self.periods.saturating_sub(sent.answers + 1)
+        });
         if let Some(recorder) = &mut self.recorder {
-            recorder.row(&row, &speeds, acted)?;
+            let command = acted.map_or(&self.safe, |sent| &sent.command);
+            recorder.row(&row, &speeds, command)?;
         }
         self.state = [row.q.as_slice(), &speeds].concat();
         self.row = row;
-        Ok(())
+        Ok(latency)
     }
 }
 
@@ -280,6 +320,10 @@ impl Driven for Remote {
 
     fn step(&mut self, command: &[f64]) -> Result<Vec<f64>, DriveError> {
         Ok(self.send_step(command)?)
+    }
+
+    fn late(&self) -> usize {
+        self.episode.as_ref().map_or(0, |episode| episode.late)
     }
 }
 

@@ -13,6 +13,9 @@ pub trait Policy {
     /// The torque (N m or N, one per joint) to hold from `time_s` on, given the sensor readings `measured` (positions,
     /// then velocities).
     fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64>;
+
+    /// So many steps have passed in which the last torque was held on: the plant did not wait.
+    fn passed(&mut self, _steps: usize) {}
 }
 
 /// A plan in which no candidate has a finite return.
@@ -34,8 +37,11 @@ pub struct Controller<'p, 'r> {
     observer: Option<Environment<'r>>,
     replan: usize,
     plan: VecDeque<Vec<f64>>,
+    /// Steps since the plan was made.
+    executed: usize,
     /// The last torques, as many as the model's delays need.
     past: VecDeque<Vec<f64>>,
+    last: Vec<f64>,
     decisions: usize,
     diverged: usize,
     lost: Vec<f64>,
@@ -57,7 +63,9 @@ impl<'p, 'r> Controller<'p, 'r> {
             observer,
             replan,
             plan: VecDeque::new(),
+            executed: 0,
             past: VecDeque::new(),
+            last: Vec::new(),
             decisions: 0,
             diverged: 0,
             lost: Vec::new(),
@@ -88,9 +96,18 @@ impl<'p, 'r> Controller<'p, 'r> {
         lost.map_or(Ok(()), Err)
     }
 
+    fn hold(&mut self, torque: Vec<f64>) {
+        self.executed += 1;
+        self.past.push_back(torque);
+        if self.past.len() > self.rollouts.memory() {
+            self.past.pop_front();
+        }
+    }
+
     fn decide(&mut self, measured: &[f64], time_s: f64) {
         if self.decisions > 0 {
-            self.planner.shift(self.replan);
+            self.planner.shift(self.executed);
+            self.executed = 0;
         }
         let past = self.past.make_contiguous();
         let carried = self.rollouts.carried(past, self.planner.horizon());
@@ -115,11 +132,16 @@ impl Policy for Controller<'_, '_> {
         if let Some(observer) = &mut self.observer {
             observer.step(&mut measured.to_vec(), &torque, time_s);
         }
-        self.past.push_back(torque.clone());
-        if self.past.len() > self.rollouts.memory() {
-            self.past.pop_front();
-        }
+        self.hold(torque.clone());
+        self.last.clone_from(&torque);
         torque
+    }
+
+    fn passed(&mut self, steps: usize) {
+        for _ in 0..steps {
+            self.plan.pop_front();
+            self.hold(self.last.clone());
+        }
     }
 }
 

@@ -23,6 +23,11 @@ pub trait Driven {
     /// # Errors
     /// A plant that diverges, or that no longer does what it is told.
     fn step(&mut self, command: &[f64]) -> Result<Vec<f64>, DriveError>;
+
+    /// Steps beyond one that passed in the last step, since the plant does not wait for a command.
+    fn late(&self) -> usize {
+        0
+    }
 }
 
 /// Why a plant can no longer be driven.

@@ -56,6 +56,7 @@ pub fn drive(
         let row = Row::of(plant);
         let command = policy.torque(&row.measured, row.time_s);
         let sent = plant.step(&command)?;
+        policy.passed(plant.late());
         stretch.push(row, &sent);
     }
     // No command in the last row.

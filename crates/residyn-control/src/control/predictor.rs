@@ -10,6 +10,8 @@ pub struct Predictor {
     equations: Dynamics,
     networks: Vec<MlpWeights>,
     integrator: Integrator,
+    /// Steps until a command acts.
+    latency: usize,
 }
 
 impl Predictor {
@@ -25,6 +27,16 @@ impl Predictor {
             equations,
             networks,
             integrator,
+            latency: 0,
+        }
+    }
+
+    /// The same for a plant on which each command acts so many steps after the state was measured that it answers.
+    #[must_use]
+    pub fn acting_after(self, steps: usize) -> Self {
+        Self {
+            latency: steps,
+            ..self
         }
     }
 
@@ -58,5 +70,6 @@ impl Predictor {
             self.integrator,
             step_s,
         )
+        .acting_after(self.latency)
     }
 }

@@ -35,6 +35,19 @@ impl Memory {
         })
     }
 
+    /// The response of filters, if there are any, to torques that act so many steps later; none without either.
+    pub fn later(filters: Option<Self>, joints: usize, steps: usize) -> Option<Self> {
+        if steps == 0 {
+            return filters;
+        }
+        let at_once = || vec![vec![1.0]; joints];
+        let weights = filters.map_or_else(at_once, |filters| filters.weights);
+        let later = |weights: Vec<f32>| [vec![0.0; steps], weights].concat();
+        Some(Self {
+            weights: weights.into_iter().map(later).collect(),
+        })
+    }
+
     /// Number of earlier steps that affect the current one.
     pub fn steps(&self) -> usize {
         let longest = self.weights.iter().map(Vec::len).max();

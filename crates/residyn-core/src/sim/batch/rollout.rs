@@ -15,7 +15,7 @@ pub struct Rollouts {
     program: Program,
     parameters: Vec<f32>,
     networks: Vec<Added>,
-    /// Present if the equations filter their torques.
+    /// Present if the equations filter their torques, or these act later.
     memory: Option<Memory>,
     integrator: Integrator,
     step_s: f32,
@@ -74,6 +74,16 @@ impl Rollouts {
             memory: Memory::new(equations, step_s),
             integrator,
             step_s: step_s as f32,
+        }
+    }
+
+    /// The same for a plant on which each torque acts so many steps later.
+    #[must_use]
+    pub fn acting_after(self, steps: usize) -> Self {
+        let joints = self.joints();
+        Self {
+            memory: Memory::later(self.memory, joints, steps),
+            ..self
         }
     }
 

@@ -291,3 +291,27 @@ fn what_lies_beyond_the_memory_does_not_matter() {
     let carried = of(&[("actuator_lag", 0, 1000.0)]).carried(&[vec![1.0]], 1);
     assert!((carried[0] - 1.0).abs() < 1e-4, "{carried:?}");
 }
+
+#[test]
+fn torques_that_act_later_move_a_model_as_torques_given_later_do() {
+    let (equations, integrator) = (equations("acrobot"), Integrator::default());
+    let (objective, at_once) = rollouts(&equations, &[], "cos(q1) + 0.01 * qd2 * t", integrator);
+    let later = at_once.acting_after(2);
+    assert_eq!(later.memory(), 2);
+    let past = [vec![1.0, -0.5], vec![-2.0, 0.3]];
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let given: Vec<Vec<f64>> = (0..STEPS)
+        .map(|_| vec![rng.random_range(-3.0..3.0), rng.random_range(-3.0..3.0)])
+        .collect();
+    let inputs = given.iter().flatten();
+    let inputs: Vec<Rows> = inputs.map(|tau| Row::from_fn(|_| *tau as f32)).collect();
+    let start = start(2);
+    let found = returns(&later, &start, 1.5, &later.carried(&past, STEPS), &inputs);
+    let acting = [&past, &given[..STEPS - 2]].concat();
+    let model = (&equations, integrator);
+    let exact = exact(model, &objective, &start, 1.5, &[], &acting);
+    assert!(
+        (f64::from(found[0]) - exact).abs() < 1e-4 * exact.abs(),
+        "{found:?} {exact}"
+    );
+}
