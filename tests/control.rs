@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
+use residyn_control::plan::Method;
 use residyn_core::data::Columns;
 use residyn_core::model::Library;
 use residyn_experiments::experiment::{Config, Session};
@@ -95,6 +96,23 @@ fn control_refuses_other_systems_tasks_and_settings() {
         says_words(&scratch.refuses(&format!("control {flags}")), &words);
     }
     assert_eq!(scratch.count(), 1, "nothing is written");
+}
+
+#[test]
+fn a_joint_without_a_motor_gets_no_torque() {
+    let task = fs::read_to_string(config("tasks/acrobot-swingup.toml")).unwrap();
+    let task = task.replace("steps = 1000", "steps = 40");
+    let passive = task.replace("[[-3.0, 3.0], [-3.0, 3.0]]", "[[0.0, 0.0], [-3.0, 3.0]]");
+    assert_ne!(task, passive);
+    for method in Method::names() {
+        let scratch = Scratch::new();
+        scratch.file("t.toml", &passive);
+        let line = "control --model acrobot --plant acrobot-sim --task t.toml --out e --method";
+        scratch.succeeds(&format!("{line} {method}"));
+        let log = read_rig_log(scratch.path("e/episode-000.csv"), 2, &Columns::default()).unwrap();
+        assert!(log.tau[0].iter().all(|tau| *tau == 0.0), "{method}");
+        assert!(log.tau[1].iter().any(|tau| *tau != 0.0), "{method}");
+    }
 }
 
 /// The error of a recipe's run on other data.

@@ -762,6 +762,9 @@ class Rod(Plant):
         self.torque = command[0]
         return Row(q=[self.q], qd=[self.qd])
 
+    def stop(self):
+        self.torque = 0.0
+
 serve(Rod())
 """
 

@@ -269,7 +269,7 @@ fn within(task: &mut Task, plant: &Description) -> Result<()> {
     let limits = task.torque.iter_mut().zip(&plant.limits.command);
     for (joint, (planned, [low, high])) in (1..).zip(limits) {
         *planned = [planned[0].max(*low), planned[1].min(*high)];
-        if !(planned[0] < planned[1]) {
+        if !(planned[0] <= planned[1]) {
             bail!(
                 "the plant {} takes commands from {low} to {high} on joint {joint}, and the task {} plans none of them",
                 plant.name,

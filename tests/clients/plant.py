@@ -99,6 +99,8 @@ def hello():
         "limits": {"limits": {"command": [[3.0, -3.0]]}},
         "unsafe": {"safe": [5.0]},
         "step": {"step_s": 0.0},
+        "name": {"name": "a\u001b[31mb"},
+        "measured": {"measured": ["a,b\n"]},
     }.get(FAULT, {})
     say({**HELLO, **changed})
 

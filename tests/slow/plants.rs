@@ -73,6 +73,8 @@ safe         | `safe` has 2 entries for 1 joints
 limits       | `limits.command` has [3, -3]
 unsafe       | `safe` is outside `limits.command`
 step         | step
+name         | the name ... is not for people
+measured     | use letters, digits and underscores
 dies         | ended without a word ... exit status: 3
 torn         | ended without a word
 garbage      | line 5 of the plant is not a message

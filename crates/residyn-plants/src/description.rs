@@ -84,6 +84,16 @@ impl Description {
         if let Err(fault) = check_step(self.step_s) {
             return Some(fault);
         }
+        let mut names = self.joints.iter().chain([&self.name]);
+        if let Some(name) = names.find(|name| name.chars().any(char::is_control)) {
+            return Some(format!("the name {name:?} is not for people"));
+        }
+        let is_plain = |name: &&String| name.chars().all(|c| c.is_alphanumeric() || c == '_');
+        if let Some(name) = self.measured.iter().find(|name| !is_plain(name)) {
+            return Some(format!(
+                "`measured` names {name:?}; use letters, digits and underscores"
+            ));
+        }
         let Limits {
             command,
             rate,

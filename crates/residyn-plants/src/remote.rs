@@ -27,6 +27,8 @@ pub struct Remote {
     wire: Wire,
     description: Description,
     episode: Option<Episode>,
+    /// Time of the last row of the episode before.
+    ended_s: Option<f64>,
     lateness: Lateness,
 }
 
@@ -99,6 +101,7 @@ impl Remote {
             wire,
             description: hello.description,
             episode: None,
+            ended_s: None,
             lateness: Lateness::default(),
         })
     }
@@ -119,12 +122,12 @@ impl Remote {
         start: Option<&[f64]>,
         path: Option<&Path>,
     ) -> Result<(), RemoteError> {
-        let last_s = self.episode.as_ref().map(|episode| episode.row.time);
         self.end()?;
         self.wire.send(&ToPlant::Reset { seed, start })?;
         let joints = self.description.joints.len();
-        // Rows of the episode before may still be on their way from a plant on the wall clock.
-        let is_before = |row: &Row| last_s.is_some_and(|last_s| row.time > last_s);
+        // Rows of the episode before, whose time goes on, may still be on their way from a plant on the wall clock.
+        let ended_s = self.ended_s;
+        let is_before = |row: &Row| ended_s.is_some_and(|ended_s| row.time > ended_s);
         let row = loop {
             let rows = self.rows(RESETTING)?;
             if let Some(row) = rows.into_iter().next().filter(|row| !is_before(row)) {
@@ -168,6 +171,7 @@ impl Remote {
         let Some(mut episode) = self.episode.take() else {
             return Ok(());
         };
+        self.ended_s = Some(episode.row.time);
         if let Some(recorder) = &mut episode.recorder {
             recorder.end(&self.description.safe)?;
         }

@@ -254,7 +254,7 @@ impl Task {
                 ));
             }
         }
-        if let Some([low, high]) = self.torque.iter().find(|[low, high]| !(low < high)) {
+        if let Some([low, high]) = self.torque.iter().find(|[low, high]| !(low <= high)) {
             return Err(format!(
                 "`torque` has the range [{low}, {high}]; write [lowest, highest]"
             ));

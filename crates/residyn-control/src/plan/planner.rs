@@ -87,7 +87,7 @@ impl<E: Evaluate> Planner<E> {
         rng: &ChaCha8Rng,
     ) -> Self {
         assert!(!bounds.is_empty(), "something to search");
-        let are_ranges = bounds.iter().all(|[low, high]| low < high);
+        let are_ranges = bounds.iter().all(|[low, high]| low <= high);
         assert!(are_ranges, "ranges that are not empty");
         let noise = search.noise(size.horizon, bounds.len());
         let block = |index: usize| {
