@@ -84,6 +84,7 @@ fn options_change_the_plant() {
 const REFUSED: &str = "
 --model acrobot --plant pendulum-real               | the model acrobot has 2 joints, but the plant pendulum has 1
 --model cartpole --plant cartpole                   | no built-in task is for cartpole; give a task file
+--model pendulum --plant pendulum-real --torque 2 2 | `torque` needs a range for each of 1 joints, found 2
 --model pendulum --plant pendulum-real --replan 81  | `replan` is 81, but a plan has 80 steps
 --model pendulum --plant pendulum --task t.toml     | t.toml: ... line 2 ... reward
 ";

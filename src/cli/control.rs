@@ -128,15 +128,18 @@ struct Files {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
+    let planned = Planned::read(arguments, &library)?;
     let mut plant = Controlled::named(arguments, &library)?;
-    let task = task(arguments, &library, &plant)?;
-    let predictor = predictor(arguments, &library, &task)?;
-    same_joints(
-        predictor.system(),
-        predictor.joints(),
-        plant.name(),
-        task.joints(),
-    )?;
+    let Model { name, joints, .. } = &planned.system;
+    if *joints != plant.joints() {
+        bail!(
+            "the model {name} has {joints} joints, but the plant {} has {}; plan with a model of the plant's system",
+            plant.name(),
+            plant.joints()
+        );
+    }
+    let task = task(arguments, &planned.system, &plant)?;
+    let predictor = planned.predictor(&task);
     let folder = arguments.out.as_deref().map(RunFolder::open).transpose()?;
     if let Some(out) = &arguments.out {
         std::fs::create_dir_all(out)
@@ -186,20 +189,11 @@ fn lost_message(episodes: &[Entry]) -> bool {
 }
 
 /// The task, with the settings of the command line.
-fn task(arguments: &Arguments, library: &Library, plant: &Controlled) -> Result<Task> {
+fn task(arguments: &Arguments, planned: &Model, plant: &Controlled) -> Result<Task> {
     let given = arguments.task.as_deref();
     let mut task = match plant {
         Controlled::Simulated(plant) => Task::for_plant(plant, given)?,
-        Controlled::Elsewhere(remote) => {
-            let system = planned_system(arguments, library)?;
-            same_joints(
-                &system.name,
-                system.joints,
-                plant.name(),
-                remote.description().joints.len(),
-            )?;
-            Task::for_system(&system.name, system.joints, given)?
-        }
+        Controlled::Elsewhere(_) => Task::for_system(&planned.name, planned.joints, given)?,
     };
     let Arguments {
         replan,
@@ -228,31 +222,11 @@ fn task(arguments: &Arguments, library: &Library, plant: &Controlled) -> Result<
             velocity: *velocity,
         };
     }
+    task.check_for(plant.joints())?;
     if let Controlled::Elsewhere(remote) = plant {
         within(&mut task, remote.description())?;
     }
-    task.check_for(task.joints())?;
     Ok(task)
-}
-
-/// The system that the plans are for.
-fn planned_system(arguments: &Arguments, library: &Library) -> Result<Model> {
-    Ok(match arguments.model.source() {
-        Source::Checkpoint(dir) => {
-            let (_, declared, _) = Checkpoint::open(dir, library, arguments.common.device)?;
-            declared
-        }
-        Source::File(file) => read_model(file, library)?,
-    })
-}
-
-fn same_joints(model: &str, own: usize, plant: &str, joints: usize) -> Result<()> {
-    if own != joints {
-        bail!(
-            "the model {model} has {own} joints, but the plant {plant} has {joints}; plan with a model of the plant's system"
-        );
-    }
-    Ok(())
 }
 
 /// A task within the limits of a plant in another process.
@@ -280,19 +254,35 @@ fn within(task: &mut Task, plant: &Description) -> Result<()> {
     Ok(())
 }
 
-fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Predictor> {
-    match arguments.model.source() {
-        Source::Checkpoint(dir) => {
-            let device = arguments.common.device;
-            let (checkpoint, _, model) = Checkpoint::open(dir, library, device)?;
-            let integrator = checkpoint.manifest.settings.integrator;
-            Ok(model.predictor(integrator))
-        }
-        Source::File(file) => {
-            let model = read_model(file, library)?;
-            model.runs_without_logs("a planner")?;
-            Ok(Predictor::of_equations(model.dynamics(), task.integrator))
-        }
+/// What the plans are made with.
+struct Planned {
+    system: Model,
+    /// Of a checkpoint; a model file is planned with by the task's integrator.
+    trained: Option<Predictor>,
+}
+
+impl Planned {
+    fn read(arguments: &Arguments, library: &Library) -> Result<Self> {
+        Ok(match arguments.model.source() {
+            Source::Checkpoint(dir) => {
+                let device = arguments.common.device;
+                let (checkpoint, system, model) = Checkpoint::open(dir, library, device)?;
+                let integrator = checkpoint.manifest.settings.integrator;
+                let trained = Some(model.predictor(integrator));
+                Self { system, trained }
+            }
+            Source::File(file) => {
+                let system = read_model(file, library)?;
+                system.runs_without_logs("a planner")?;
+                let trained = None;
+                Self { system, trained }
+            }
+        })
+    }
+
+    fn predictor(self, task: &Task) -> Predictor {
+        let of_equations = || Predictor::of_equations(self.system.dynamics(), task.integrator);
+        self.trained.unwrap_or_else(of_equations)
     }
 }
 
@@ -412,6 +402,13 @@ impl Controlled {
         match self {
             Self::Simulated(plant) => &plant.system.name,
             Self::Elsewhere(remote) => &remote.description().name,
+        }
+    }
+
+    fn joints(&self) -> usize {
+        match self {
+            Self::Simulated(plant) => plant.system.joints,
+            Self::Elsewhere(remote) => remote.description().joints.len(),
         }
     }
 

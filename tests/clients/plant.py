@@ -66,6 +66,9 @@ def answer(number, state):
         sys.exit(0)
     elif FAULT == "silent":
         time.sleep(600)
+    elif FAULT == "closes":
+        os.close(1)
+        time.sleep(600)
     else:
         write(
             {

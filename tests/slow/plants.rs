@@ -77,6 +77,7 @@ name         | the name ... is not for people
 measured     | use letters, digits and underscores
 dies         | ended without a word ... exit status: 3
 torn         | ended without a word
+closes       | ended without a word
 garbage      | line 5 of the plant is not a message
 binary       | line 5 of the plant is not a message
 long         | longer than 1000000 bytes

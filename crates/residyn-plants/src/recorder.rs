@@ -12,7 +12,6 @@ pub struct Recorder {
     names: Vec<String>,
     /// The newest row, whose command is known once the next row says what acted.
     newest: Option<Row>,
-    speeds: Vec<f64>,
 }
 
 impl Recorder {
@@ -39,18 +38,16 @@ impl Recorder {
             file,
             names: description.measured.clone(),
             newest: None,
-            speeds: Vec::new(),
         })
     }
 
-    /// A row, its velocities, and the command that acted up to it.
+    /// A row with its velocities, and the command that acted up to it.
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn row(&mut self, row: &Row, speeds: &[f64], acted: &[f64]) -> io::Result<()> {
+    pub fn row(&mut self, row: &Row, acted: &[f64]) -> io::Result<()> {
         self.write_newest(acted)?;
         self.newest = Some(row.clone());
-        self.speeds = speeds.to_vec();
         Ok(())
     }
 
@@ -70,7 +67,7 @@ impl Recorder {
         let missing = f64::NAN;
         let measured = self.names.iter();
         let measured = measured.map(|name| row.measured.get(name).unwrap_or(&missing));
-        let values = row.q.iter().chain(&self.speeds).chain(command);
+        let values = row.q.iter().chain(row.qd.iter().flatten()).chain(command);
         let mut line = row.time.to_string();
         for value in values.chain(measured) {
             let _ = match value.is_nan() {

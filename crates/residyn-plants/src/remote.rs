@@ -270,12 +270,12 @@ impl Episode {
     }
 
     /// A row that is right. Returns the latency of the command that acted up to it, if it is the first such row.
-    fn take(&mut self, row: Row) -> Result<Option<usize>, RemoteError> {
-        let apart_s = row.time - self.row.time;
-        let speeds = row.qd.clone().unwrap_or_else(|| {
-            let moved = row.q.iter().zip(&self.row.q);
+    fn take(&mut self, mut row: Row) -> Result<Option<usize>, RemoteError> {
+        let speeds = row.qd.get_or_insert_with(|| {
+            let (apart_s, moved) = (row.time - self.row.time, row.q.iter().zip(&self.row.q));
             moved.map(|(now, then)| (now - then) / apart_s).collect()
         });
+        self.state = [row.q.as_slice(), speeds].concat();
         // Ids grow: what was sent before the command that acted is over.
         let is_over = |sent: &Sent| sent.id < row.command;
         while row.command > 0 && self.sent.front().is_some_and(is_over) {
@@ -291,9 +291,8 @@ impl Episode {
         });
         if let Some(recorder) = &mut self.recorder {
             let command = acted.map_or(&self.safe, |sent| &sent.command);
-            recorder.row(&row, &speeds, command)?;
+            recorder.row(&row, command)?;
         }
-        self.state = [row.q.as_slice(), &speeds].concat();
         self.row = row;
         Ok(latency)
     }

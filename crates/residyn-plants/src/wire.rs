@@ -1,6 +1,6 @@
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -142,19 +142,26 @@ impl Wire {
         if let Out::Pipe(pipe) = &mut self.out {
             pipe.take();
         }
-        let Some(mut child) = self.child.take() else {
-            return;
-        };
+        if self.status().is_none()
+            && let Some(mut child) = self.child.take()
+        {
+            // It was told twice.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+
+    /// How a plant that was started here ended; `None` if it does not end soon.
+    fn status(&mut self) -> Option<ExitStatus> {
+        let child = self.child.as_mut()?;
         let until = Instant::now() + ENDING;
         while Instant::now() < until {
-            if !matches!(child.try_wait(), Ok(None)) {
-                return;
+            if let Some(status) = child.try_wait().ok()? {
+                return Some(status);
             }
             thread::sleep(Duration::from_millis(5));
         }
-        // It was told twice; what it is is no longer safe to wait for.
-        let _ = child.kill();
-        let _ = child.wait();
+        None
     }
 
     fn message(&mut self, line: Line) -> Result<FromPlant, RemoteError> {
@@ -178,16 +185,17 @@ impl Wire {
 
     /// The error that the plant had sent when it went, or that it has gone.
     fn last_words(&mut self) -> RemoteError {
-        loop {
-            match self.receive(ENDING) {
-                Ok(_) => {}
-                Err(error) => return error,
+        let until = Instant::now() + ENDING;
+        while Instant::now() < until {
+            if let Err(error) = self.receive(ENDING) {
+                return error;
             }
         }
+        self.ended()
     }
 
     fn ended(&mut self) -> RemoteError {
-        let status = self.child.as_mut().and_then(|child| child.wait().ok());
+        let status = self.status();
         RemoteError::Ended(status.map_or_else(String::new, |status| format!(" ({status})")))
     }
 }

@@ -229,12 +229,7 @@ def main() -> int:
     options.add_argument("--step", type=float, metavar="S", help="how long a command is held, s")
     given = options.parse_args()
     ready = READY[given.environment]
-    try:
-        plant = ready.make(given.step or ready.step_s)
-    except PlantError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return serve_at(plant, given.tcp)
+    return serve_at(lambda: ready.make(given.step or ready.step_s), given.tcp)
 
 
 if __name__ == "__main__":

@@ -302,14 +302,13 @@ def main() -> int:
     given = options.parse_args()
     # By default MuJoCo writes its warnings to a file in the working folder.
     mujoco.set_mju_user_warning(_warn)
-    try:
+
+    def plant() -> MujocoPlant:
         sensors = Sensors(given.position_noise, given.velocity_noise, given.encoder_step)
-        plant = MujocoPlant(
+        return MujocoPlant(
             given.model, step_s=given.step, delay=given.delay, sensors=sensors, rate=given.rate, speed=given.speed
         )
-    except PlantError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+
     return serve_at(plant, given.tcp)
 
 

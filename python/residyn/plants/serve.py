@@ -4,7 +4,7 @@ import argparse
 import os
 import socket
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from .conversation import Interrupted, Interrupts, converse
 from .description import description
@@ -35,20 +35,21 @@ def serve(plant: Plant, arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit status.
     """
-    return serve_at(plant, parser(plant.name).parse_args(arguments).tcp)
+    return serve_at(lambda: plant, parser(plant.name).parse_args(arguments).tcp)
 
 
-def serve_at(plant: Plant, address: str | None) -> int:
+def serve_at(make: Callable[[], Plant], address: str | None) -> int:
     """Serve on standard input and output, or on a TCP address.
 
     Args:
-        plant: to be served.
+        make: makes the plant to be served; a plant that cannot be is reported.
         address: HOST:PORT, or PORT for this machine alone; None for standard input and output.
 
     Returns:
         The exit status.
     """
     try:
+        plant = make()
         description(plant)
         where = None if address is None else _address(address)
     except PlantError as error:

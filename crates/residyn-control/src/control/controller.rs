@@ -96,9 +96,10 @@ impl<'p, 'r> Controller<'p, 'r> {
         lost.map_or(Ok(()), Err)
     }
 
-    fn hold(&mut self, torque: Vec<f64>) {
+    /// The last torque acts for a step.
+    fn hold(&mut self) {
         self.executed += 1;
-        self.past.push_back(torque);
+        self.past.push_back(self.last.clone());
         if self.past.len() > self.rollouts.memory() {
             self.past.pop_front();
         }
@@ -132,15 +133,15 @@ impl Policy for Controller<'_, '_> {
         if let Some(observer) = &mut self.observer {
             observer.step(&mut measured.to_vec(), &torque, time_s);
         }
-        self.hold(torque.clone());
         self.last.clone_from(&torque);
+        self.hold();
         torque
     }
 
     fn passed(&mut self, steps: usize) {
         for _ in 0..steps {
             self.plan.pop_front();
-            self.hold(self.last.clone());
+            self.hold();
         }
     }
 }
