@@ -10,6 +10,7 @@ use residyn_core::model::Library;
 use residyn_experiments::experiment::{Config, Session};
 use residyn_io::read_rig_log;
 use residyn_io::runs::Shard;
+use residyn_plants::Reach;
 use residyn_train::recipe::{Job, Recipe};
 use residyn_train::{Backend, Checkpoint};
 use serde_json::Value;
@@ -182,7 +183,7 @@ fn every_experiment_is_sound() {
             let config = Config::read(&path).unwrap();
             assert!(config.seeds >= 10, "{}", config.path.display());
             assert!(
-                Session::open(config, &library, Backend::NdArray, 0)
+                Session::open(config, &library, Backend::NdArray, 0, Reach::Here)
                     .unwrap()
                     .rounds(Shard::WHOLE)
                     > 0

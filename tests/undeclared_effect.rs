@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use residyn_core::model::Library;
 use residyn_experiments::experiment::undeclared_effect::{Experiment, PlanningModel, Session};
 use residyn_io::runs::RunFolder;
+use residyn_plants::Reach;
 use residyn_train::Backend;
 
 use crate::support::Scratch;
@@ -14,7 +15,14 @@ use crate::support::tables::rows;
 
 fn session(path: &Path) -> Session {
     let experiment = Experiment::read(path).unwrap();
-    Session::new(experiment, Library::built_in(), Backend::NdArray, 0).unwrap()
+    Session::new(
+        experiment,
+        Library::built_in(),
+        Backend::NdArray,
+        0,
+        Reach::Here,
+    )
+    .unwrap()
 }
 
 fn smoke() -> PathBuf {
@@ -84,7 +92,8 @@ fn bad_experiments_are_refused_with_their_remedy() {
     for [from, to, words] in rows(BAD) {
         let path = scratch.changed("smoke/undeclared-effect.toml", &from, &to);
         let read = Experiment::read(path.as_ref());
-        let session = read.and_then(|e| Session::new(e, Library::built_in(), Backend::NdArray, 0));
+        let session = read
+            .and_then(|e| Session::new(e, Library::built_in(), Backend::NdArray, 0, Reach::Here));
         let found = session.err().unwrap().to_string();
         assert!(found.contains(&words), "{found}");
         assert!(found.starts_with(&path), "{found}");

@@ -100,14 +100,10 @@ impl Question {
         let mut rng = stream(*seed, Purpose::Judge(number));
         let dynamics = plant.dynamics();
         let start = task.draw_start(&mut rng);
-        let mut rig = task.rig(plant, &dynamics, &start);
+        let rig = task.rig(plant, &dynamics, &start);
         let draws = stream(*seed, Purpose::JudgePlan(number));
         with_controller(predictor, task, task.replan, &draws, |controller| {
-            let mut plant = Simulated {
-                rig: &mut rig,
-                noise: &mut rng,
-            };
-            episode(task, &mut plant, controller)
+            episode(task, &mut Simulated { rig, noise: rng }, controller)
         })
     }
 }

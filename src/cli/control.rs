@@ -1,29 +1,29 @@
 use std::fmt::Write;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 
+use super::elsewhere::Elsewhere;
 use super::inputs::{self, Source};
 use super::{Answer, Common, interrupt, progress, terminal};
-use rand::{Rng, RngExt};
 use residyn_control::control::{
-    Controller, Episode, Policy, Predictor, Simulated, Task, episode, with_controller,
+    Controller, Episode, Policy, Predictor, Task, episode, with_controller,
 };
 use residyn_control::plan::Method;
 use residyn_core::data::statistics::{mean, sample_deviation};
 use residyn_core::data::{Joint, Log};
 use residyn_core::model::{Library, Model};
-use residyn_core::plant::{Noise, Plant};
+use residyn_core::plant::Noise;
 use residyn_core::streams::{Purpose, stream};
 use residyn_io::files::write_whole;
 use residyn_io::read_model;
 use residyn_io::runs::RunFolder;
-use residyn_io::{read_plant, write_log};
-use residyn_plants::{Address, AddressError, Clock, Description, Lateness, Remote};
+use residyn_io::write_log;
+use residyn_plants::{Beginning, Controlled, plant_seed};
 use residyn_plot::{JointKind, Panel, PlotError, Role, Track, predictions};
 use residyn_train::Checkpoint;
 
@@ -41,9 +41,8 @@ pub(super) struct Arguments {
     /// tcp:HOST:PORT
     #[arg(long, value_name = "NAME")]
     plant: PathBuf,
-    /// Connect to a tcp: plant on another machine, over a network that nothing protects
-    #[arg(long)]
-    plant_elsewhere: bool,
+    #[command(flatten)]
+    elsewhere: Elsewhere,
     /// Task file, or the name of a built-in task; by default a built-in one of the plant's system
     #[arg(long, value_name = "FILE")]
     task: Option<PathBuf>,
@@ -129,15 +128,7 @@ struct Files {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
     let planned = Planned::read(arguments, &library)?;
-    let mut plant = Controlled::named(arguments, &library)?;
-    let Model { name, joints, .. } = &planned.system;
-    if *joints != plant.joints() {
-        bail!(
-            "the model {name} has {joints} joints, but the plant {} has {}; plan with a model of the plant's system",
-            plant.name(),
-            plant.joints()
-        );
-    }
+    let plant = arguments.elsewhere.open(&arguments.plant, &library)?;
     let task = task(arguments, &planned.system, &plant)?;
     let predictor = planned.predictor(&task);
     let folder = arguments.out.as_deref().map(RunFolder::open).transpose()?;
@@ -155,7 +146,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let bar = progress::bar(count);
     let mut entries = Vec::new();
     for number in 0..count {
-        entries.push(one(arguments, &mut plant, &task, &predictor, number)?);
+        entries.push(one(arguments, &plant, &task, &predictor, number)?);
         bar.inc(1);
         bar.set_message("episodes");
     }
@@ -183,7 +174,8 @@ fn lost_message(episodes: &[Entry]) -> bool {
     let plans: usize = episodes.iter().map(|e| e.decisions).sum();
     terminal::tell(format!(
         "warning: {lost} of {plans} plan(s) failed, the first in episode {number} at {first_s:.3} s: no candidate has \
-         a finite return; fix the model or the objective of the task, or shorten the planner's horizon"
+         a finite return, and the plant held its safe command; fix the model or the objective of the task, or shorten the \
+         planner's horizon"
     ));
     true
 }
@@ -192,7 +184,7 @@ fn lost_message(episodes: &[Entry]) -> bool {
 fn task(arguments: &Arguments, planned: &Model, plant: &Controlled) -> Result<Task> {
     let given = arguments.task.as_deref();
     let mut task = match plant {
-        Controlled::Simulated(plant) => Task::for_plant(plant, given)?,
+        Controlled::Simulated(simulation) => Task::for_plant(&simulation.plant, given)?,
         Controlled::Elsewhere(_) => Task::for_system(&planned.name, planned.joints, given)?,
     };
     let Arguments {
@@ -222,36 +214,9 @@ fn task(arguments: &Arguments, planned: &Model, plant: &Controlled) -> Result<Ta
             velocity: *velocity,
         };
     }
+    plant.bound(&mut task, planned)?;
     task.check_for(plant.joints())?;
-    if let Controlled::Elsewhere(remote) = plant {
-        within(&mut task, remote.description())?;
-    }
     Ok(task)
-}
-
-/// A task within the limits of a plant in another process.
-fn within(task: &mut Task, plant: &Description) -> Result<()> {
-    if (task.step_s - plant.step_s).abs() > 1e-9 * task.step_s {
-        bail!(
-            "the task {} holds a command for {} s, the plant {} for {} s; let them agree",
-            task.name(),
-            task.step_s,
-            plant.name,
-            plant.step_s
-        );
-    }
-    let limits = task.torque.iter_mut().zip(&plant.limits.command);
-    for (joint, (planned, [low, high])) in (1..).zip(limits) {
-        *planned = [planned[0].max(*low), planned[1].min(*high)];
-        if !(planned[0] <= planned[1]) {
-            bail!(
-                "the plant {} takes commands from {low} to {high} on joint {joint}, and the task {} plans none of them",
-                plant.name,
-                task.name()
-            );
-        }
-    }
-    Ok(())
 }
 
 /// What the plans are made with.
@@ -288,23 +253,30 @@ impl Planned {
 
 fn one(
     arguments: &Arguments,
-    plant: &mut Controlled,
+    plant: &Controlled,
     task: &Task,
     predictor: &Predictor,
     number: usize,
 ) -> Result<Entry> {
     let seed = arguments.common.seed;
-    let mut rng = stream(seed, Purpose::Judge(number));
-    let start = task.draw_start(&mut rng);
+    let mut noise = stream(seed, Purpose::Judge(number));
+    let start = task.draw_start(&mut noise);
     let log = (arguments.out.as_deref()).map(|out| out.join(format!("episode-{number:03}.csv")));
     let draws = stream(seed, Purpose::JudgePlan(number));
     let predictor = &predictor.clone().acting_after(plant.latency());
+    let beginning = Beginning {
+        task,
+        start: &start,
+        seed: plant_seed(&noise),
+        noise,
+        log: log.as_deref(),
+    };
     with_controller(predictor, task, task.replan, &draws, |controller| {
         let mut timed = Timed {
             controller,
             deciding: Duration::ZERO,
         };
-        let episode = plant.episode(task, &start, &mut timed, &mut rng, log.as_deref())?;
+        let episode = plant.during(beginning, |plant| episode(task, plant, &mut timed))?;
         let Timed {
             controller,
             deciding,
@@ -314,8 +286,8 @@ fn one(
             late: lateness.late,
             latency_s: lateness.latency() as f64 * task.step_s,
         });
-        let files = match log {
-            Some(log) => Some(written(arguments, plant, task, &episode, log)?),
+        let files = match &log {
+            Some(log) => Some(written(plant, task, &episode, log.clone())?),
             None => None,
         };
         Ok(Entry {
@@ -332,13 +304,7 @@ fn one(
 }
 
 /// Write an episode and its plot; a plant in another process has written its log already.
-fn written(
-    arguments: &Arguments,
-    plant: &Controlled,
-    task: &Task,
-    episode: &Episode,
-    log: PathBuf,
-) -> Result<Files> {
+fn written(plant: &Controlled, task: &Task, episode: &Episode, log: PathBuf) -> Result<Files> {
     if matches!(plant, Controlled::Simulated(_)) {
         write_log(&episode.stretch.log, &log)?;
     }
@@ -346,7 +312,7 @@ fn written(
     let title = format!(
         "{} on {}: return {:.1}",
         task.name(),
-        arguments.plant.display(),
+        plant.name(),
         episode.total()
     );
     write_whole(
@@ -361,7 +327,7 @@ fn positions(plant: &Controlled, log: &Log, title: &str) -> Result<String, PlotE
     let points = |joint: Joint| log.time.iter().copied().zip(log.q[joint].iter().copied());
     let panel = |joint: Joint| Panel {
         label: plant.joint_label(joint),
-        quantity: plant.joint_kind(joint).position(joint),
+        quantity: JointKind::of(plant.slides(joint)).position(joint),
         tracks: vec![Track {
             label: "measured".to_owned(),
             role: Role::Measured,
@@ -372,104 +338,6 @@ fn positions(plant: &Controlled, log: &Log, title: &str) -> Result<String, PlotE
     predictions(&panels, title)
 }
 
-/// What is controlled.
-enum Controlled {
-    Simulated(Box<Plant>),
-    Elsewhere(Box<Remote>),
-}
-
-impl Controlled {
-    fn named(arguments: &Arguments, library: &Library) -> Result<Self> {
-        let Arguments {
-            plant,
-            plant_elsewhere,
-            ..
-        } = arguments;
-        let Some(address) = Address::in_text(plant, *plant_elsewhere) else {
-            return Ok(Self::Simulated(Box::new(read_plant(plant, library)?)));
-        };
-        let address = address.map_err(|error| match error {
-            AddressError::OtherMachine(_) => {
-                anyhow!("{error}: use a tunnel, or --plant-elsewhere")
-            }
-            _ => error.into(),
-        })?;
-        let program = concat!("residyn ", env!("CARGO_PKG_VERSION"));
-        Ok(Self::Elsewhere(Box::new(Remote::open(&address, program)?)))
-    }
-
-    fn name(&self) -> &str {
-        match self {
-            Self::Simulated(plant) => &plant.system.name,
-            Self::Elsewhere(remote) => &remote.description().name,
-        }
-    }
-
-    fn joints(&self) -> usize {
-        match self {
-            Self::Simulated(plant) => plant.system.joints,
-            Self::Elsewhere(remote) => remote.description().joints.len(),
-        }
-    }
-
-    fn joint_label(&self, joint: Joint) -> String {
-        match self {
-            Self::Simulated(plant) => plant.system.joint_label(joint),
-            Self::Elsewhere(remote) => remote.description().joints[joint.index()].clone(),
-        }
-    }
-
-    fn joint_kind(&self, joint: Joint) -> JointKind {
-        JointKind::of(match self {
-            Self::Simulated(plant) => plant.system.prismatic[joint],
-            // It does not say so.
-            Self::Elsewhere(_) => false,
-        })
-    }
-
-    /// An episode from `start`, where the plant can be put somewhere; one in another process is kept in `log` row by row.
-    fn episode(
-        &mut self,
-        task: &Task,
-        start: &[f64],
-        policy: &mut dyn Policy,
-        rng: &mut impl Rng,
-        log: Option<&Path>,
-    ) -> Result<Episode> {
-        match self {
-            Self::Simulated(plant) => {
-                let dynamics = plant.dynamics();
-                let mut rig = task.rig(plant, &dynamics, start);
-                let (rig, noise) = (&mut rig, rng);
-                Ok(episode(task, &mut Simulated { rig, noise }, policy)?)
-            }
-            Self::Elsewhere(remote) => {
-                let is_simulated = remote.description().clock == Clock::Simulated;
-                let seed = rng.random_range(0..1 << 53);
-                remote.begin(seed, is_simulated.then_some(start), log)?;
-                let episode = episode(task, remote.as_mut(), policy);
-                remote.end()?;
-                Ok(episode?)
-            }
-        }
-    }
-
-    /// How late commands came to a plant that does not wait.
-    fn lateness(&self) -> Option<&Lateness> {
-        match self {
-            Self::Elsewhere(remote) if remote.description().clock == Clock::Wall => {
-                Some(remote.lateness())
-            }
-            _ => None,
-        }
-    }
-
-    /// Steps until a command acts, as measured in the episode before.
-    fn latency(&self) -> usize {
-        self.lateness().map_or(0, Lateness::latency)
-    }
-}
-
 /// A controller that measures the time of its decisions.
 struct Timed<'c, 'p, 'r> {
     controller: &'c mut Controller<'p, 'r>,
@@ -477,15 +345,15 @@ struct Timed<'c, 'p, 'r> {
 }
 
 impl Policy for Timed<'_, '_, '_> {
-    fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64> {
+    fn torque(&mut self, measured: &[f64], time_s: f64) -> Option<Vec<f64>> {
         let began = Instant::now();
         let torque = self.controller.torque(measured, time_s);
         self.deciding += began.elapsed();
         torque
     }
 
-    fn passed(&mut self, steps: usize) {
-        self.controller.passed(steps);
+    fn sent(&mut self, torque: &[f64], steps: usize) {
+        self.controller.sent(torque, steps);
     }
 }
 

@@ -1,13 +1,14 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use indicatif::ProgressBar;
 use serde_json::Value;
 
 use super::call::{Begun, files};
+use super::elsewhere::InItsPlace;
 use super::shard::{self, Sharding};
 use super::{Answer, Common, command_line, inputs, interrupt, progress, terminal};
 use residyn_core::model::Library;
@@ -36,6 +37,8 @@ pub(super) struct Arguments {
     /// Folder for the results and all runs
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    in_its_place: InItsPlace,
     #[command(flatten)]
     effects: inputs::Effects,
     #[command(flatten)]
@@ -157,8 +160,10 @@ fn carry_out_published(
     clock: &Clock<'_>,
 ) -> Result<Option<Finished>> {
     let Common { device, seed, .. } = arguments.common;
-    let config = Config::read(&arguments.config)?;
-    let session = Session::open(config, library, device, seed)?;
+    let mut config = Config::read(&arguments.config)?;
+    arguments.in_its_place.put_into(&mut config);
+    let reach = arguments.in_its_place.elsewhere.reach();
+    let session = Session::open(config, library, device, seed, reach)?;
     let work = Work {
         run: session.run_of_experiment(experiment),
         steps: &|shard| session.rounds(shard),
@@ -197,8 +202,14 @@ fn undeclared_effect(
     clock: &Clock<'_>,
 ) -> Result<Option<Finished>> {
     let Common { device, seed, .. } = arguments.common;
+    if arguments.in_its_place.plant.is_some() {
+        bail!(
+            "--plant is for an experiment with one plant; {UNDECLARED_EFFECT} names the plant of each `[[case]]`"
+        );
+    }
     let experiment = undeclared_effect::Experiment::read(&arguments.config)?;
-    let session = undeclared_effect::Session::new(experiment, library, device, seed)?;
+    let reach = arguments.in_its_place.elsewhere.reach();
+    let session = undeclared_effect::Session::new(experiment, library, device, seed, reach)?;
     let work = Work {
         run: session.run_of_all(),
         steps: &|shard| shard.share(session.trials()).count(),

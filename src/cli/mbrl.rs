@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use serde_json::json;
 
+use super::elsewhere::InItsPlace;
 use super::experiment::message;
 use super::{Answer, Common, inputs, interrupt, progress, terminal};
 use residyn_experiments::experiment::{Config, FinishedRound, Session};
@@ -18,7 +19,8 @@ use residyn_io::runs::RunFolder;
 /// interrupted, and ends with the same numbers.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  residyn mbrl --config configs/physics-prior/pendulum.toml --method hybrid --out run --seed 1"
+    after_help = "Examples:\n  residyn mbrl --config configs/physics-prior/pendulum.toml --method hybrid --out run --seed 1\n  \
+                  residyn mbrl --config rig.toml --plant exec:\"python my_rig.py\" --out run"
 )]
 pub(super) struct Arguments {
     /// An experiment's configuration
@@ -31,6 +33,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
+    in_its_place: InItsPlace,
+    #[command(flatten)]
     effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
@@ -41,12 +45,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         config,
         method,
         out,
+        in_its_place,
         effects,
         common,
     } = arguments;
     let folder = RunFolder::open(out)?;
     let library = effects.library()?;
-    let session = Session::open(Config::read(config)?, &library, common.device, common.seed)?;
+    let mut config = Config::read(config)?;
+    in_its_place.put_into(&mut config);
+    let reach = in_its_place.elsewhere.reach();
+    let session = Session::open(config, &library, common.device, common.seed, reach)?;
     let rounds = Mutex::new(Vec::new());
     let begun = Instant::now();
     let bar = progress::bar(session.rounds_of(method));

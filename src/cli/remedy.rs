@@ -12,6 +12,7 @@ use residyn_experiments::experiment::ExperimentError;
 use residyn_formats::ExportError;
 use residyn_io::files::OutputError;
 use residyn_io::runs::{MergeError, RunFolderError};
+use residyn_plants::AddressError;
 use residyn_train::recipe::RecipeError;
 use residyn_validation::GridError;
 use residyn_validation::rigs::RigsError;
@@ -30,6 +31,7 @@ pub(super) fn prediction(model: &Path) -> String {
 /// What to do about an error, in terms of the command line, which the library knows nothing about.
 pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
     None.or_else(|| of_open_files(error))
+        .or_else(|| error.downcast_ref().and_then(of_address))
         .or_else(|| error.downcast_ref().and_then(of_output))
         .or_else(|| error.downcast_ref().and_then(of_folder))
         .or_else(|| error.downcast_ref().and_then(of_merge))
@@ -63,6 +65,10 @@ fn of_open_files(error: &(dyn Error + 'static)) -> Option<&'static str> {
     Chain::new(error)
         .any(is_it)
         .then_some("raise the limit with `ulimit -n`, or merge a few of the parts at a time")
+}
+
+fn of_address(error: &AddressError) -> Option<&'static str> {
+    matches!(error, AddressError::OtherMachine(_)).then_some("use a tunnel, or --plant-elsewhere")
 }
 
 fn of_output(error: &OutputError) -> Option<&'static str> {

@@ -1,27 +1,33 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
 
+use super::elsewhere::Elsewhere;
+use super::record::record;
 use super::{Answer, Common, inputs, terminal};
-use residyn_core::data::Joint;
+use residyn_core::data::{Joint, Log};
 use residyn_core::model::Library;
 use residyn_core::plant::Plant;
 use residyn_core::rng;
 use residyn_io::files::check_room;
-use residyn_io::{read_plant, write_log};
+use residyn_io::write_log;
+use residyn_plants::Controlled;
 
-/// Write the log of a simulated rig, with chosen effects and sensor noise
+/// Write the log of a simulated rig, with chosen effects and sensor noise, or of a plant in another process
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  residyn simulate --plant pendulum --effect coulomb_friction=0.16 --out run1.csv --seed 1"
 )]
 pub(super) struct Arguments {
-    /// Plant file, model file, or the name of a built-in system
-    #[arg(long, value_name = "FILE")]
+    /// Plant file, model file, or the name of a built-in system; or a plant in another process, exec:COMMAND or
+    /// tcp:HOST:PORT, which moves under a multisine within its limits
+    #[arg(long, value_name = "NAME")]
     plant: PathBuf,
+    #[command(flatten)]
+    elsewhere: Elsewhere,
     /// Log file to write
     #[arg(long, value_name = "LOG")]
     out: PathBuf,
@@ -78,26 +84,48 @@ impl FromStr for EffectSetting {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
-    let mut plant = read_plant(&arguments.plant, &library)?;
-    add_effects(&mut plant, &library, &arguments.effect)?;
-    if let Some(duration) = arguments.duration {
-        let lasting = plant.lasting(duration);
-        plant = lasting.with_context(|| format!("--duration {duration:?}"))?;
-    }
     check_room(&arguments.out)?;
-    let mut rng = rng(arguments.common.seed);
-    let log = terminal::stage("simulating", || plant.record(&mut rng))?;
-    write_log(&log, &arguments.out).context("the log was not written")?;
-    let effects: Vec<&str> = plant
-        .effects
-        .iter()
-        .map(|e| e.effect.name.as_str())
-        .collect();
+    let (log, effects) = match arguments.elsewhere.open(&arguments.plant, &library)? {
+        Controlled::Simulated(simulation) => simulated(arguments, simulation.plant, &library)?,
+        Controlled::Elsewhere(fleet) => {
+            if !arguments.effect.is_empty() {
+                bail!("--effect is for a simulated rig; a plant in another process has its own");
+            }
+            let Arguments {
+                out,
+                duration,
+                common,
+                ..
+            } = arguments;
+            let duration_s = duration
+                .context("a plant in another process has no length of its own; add --duration")?;
+            let recorded = || record(&fleet, duration_s, common.seed, out);
+            (terminal::stage("recording", recorded)?, Vec::new())
+        }
+    };
     let value = || json!({"out": arguments.out, "rows": log.rows(), "duration_s": log.duration(), "effects": effects});
     let (out, rows, duration_s) = (arguments.out.display(), log.rows(), log.duration());
     let line = format!("{out}: {rows} rows, {duration_s} s");
     (arguments.common).answer(value, &line, &format!("{line}\n"))?;
     Ok(Answer::Yes)
+}
+
+/// The log of a simulated rig, and the names of its effects.
+fn simulated(
+    arguments: &Arguments,
+    mut plant: Plant,
+    library: &Library,
+) -> Result<(Log, Vec<String>)> {
+    add_effects(&mut plant, library, &arguments.effect)?;
+    if let Some(duration) = arguments.duration {
+        let lasting = plant.lasting(duration);
+        plant = lasting.with_context(|| format!("--duration {duration:?}"))?;
+    }
+    let mut rng = rng(arguments.common.seed);
+    let log = terminal::stage("simulating", || plant.record(&mut rng))?;
+    write_log(&log, &arguments.out).context("the log was not written")?;
+    let effects = plant.effects.iter().map(|e| e.effect.name.clone());
+    Ok((log, effects.collect()))
 }
 
 /// Adds the effects, each with all settings for it on its joint.

@@ -6,7 +6,6 @@ q = 0 is upright, as in the built-in system `pendulum`.
 import json
 import math
 import os
-import signal
 import sys
 import time
 
@@ -56,7 +55,7 @@ def answer(number, state):
     rows = {"type": "rows", "rows": [row(number, state)]}
     if FAULT == "unsolicited":
         say(rows)
-    if number < 3 or FAULT in ("none", "past", "repeated", "unsolicited", "counting") or FAULT.startswith("killed"):
+    if number < 3 or FAULT in ("none", "past", "repeated", "unsolicited", "counting"):
         say(rows)
     elif FAULT == "flood":
         for later in range(100_000):
@@ -109,14 +108,16 @@ def hello():
 
 
 def count(rows):
-    """Keep the number of rows of the episode where the host's death does not touch it, and die at the row that was asked."""
+    """Keep the number of rows of the episode where no death touches it."""
     if FAULT == "counting":
-        with open("rows", "w") as file:
+        with open("new", "w") as file:
             file.write(str(rows))
-    if FAULT.startswith("killed at ") and rows == int(FAULT.split()[-1]):
-        os.kill(os.getpid(), signal.SIGKILL)
+        os.replace("new", "rows")
 
 
+if FAULT == "counting":
+    with open("pid", "w") as file:
+        file.write(str(os.getpid()))
 if FAULT == "mute":
     sys.exit(0)
 if FAULT == "early":

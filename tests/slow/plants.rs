@@ -1,11 +1,13 @@
 //! Plants in another process, of which tests/clients/plant.py is one: what it does, and what it does wrong.
 
 use std::fs;
-use std::process::Stdio;
+use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
+use rand::{Rng, RngExt};
 use residyn_core::data::Columns;
+use residyn_core::rng;
 use residyn_io::read_rig_log;
 use serde_json::Value;
 
@@ -155,56 +157,201 @@ fn addresses_and_limits_are_checked_before_a_plant_moves() {
     );
 }
 
-/// The rows of the newest log in the folder of episodes.
+/// The rows of the newest log in the folder of episodes; none before there is a log.
 fn rows_of_newest(scratch: &Scratch) -> usize {
-    let logs = fs::read_dir(scratch.path("e")).unwrap();
-    let paths = logs.map(|entry| entry.unwrap().path());
-    let newest = paths.filter(|path| path.extension().is_some_and(|e| e == "csv"));
-    let log = read_rig_log(newest.max().unwrap(), 1, &Columns::default());
-    log.map_or(0, |log| log.rows())
+    let entries = fs::read_dir(scratch.path("e")).into_iter().flatten();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    let logs = paths.filter(|path| path.extension().is_some_and(|e| e == "csv"));
+    let newest = logs.max();
+    newest.map_or(0, |log| {
+        read_rig_log(&log, 1, &Columns::default()).map_or(0, |log| log.rows())
+    })
+}
+
+#[test]
+fn a_plan_that_diverges_is_never_sent() {
+    let Some(words) = controlling("none") else {
+        return;
+    };
+    let scratch = Scratch::new();
+    let endless = "objective = \"1e300 * (1 + q1^2)\"";
+    scratch.changed("tasks/pendulum.toml", "objective = \"cos(q1)\"", endless);
+    let mut command = scratch.command("");
+    let output = command.args(&words).args(["--task", "pendulum.toml"]);
+    let output = output.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    says(
+        &said,
+        &["500 of 500 plan(s) failed", "held its safe command"],
+    );
+    let log = read_rig_log(scratch.path("e/episode-000.csv"), 1, &Columns::default()).unwrap();
+    assert!(log.tau[0].iter().all(|tau| *tau == 0.0));
+}
+
+/// Number of kills in each test of them: `RESIDYN_KILLS`, or enough to see that they are survived.
+fn kills() -> usize {
+    let asked = std::env::var("RESIDYN_KILLS").ok();
+    asked.map_or(12, |count| count.parse().unwrap())
+}
+
+/// A host that drives a plant which counts its rows, and its folder.
+fn counting() -> Option<(Scratch, Child)> {
+    let words = controlling("counting")?;
+    let scratch = Scratch::new();
+    let mut command = scratch.command("");
+    let command = (command.args(&words)).args(["--replan", "1", "--episodes", "99"]);
+    let mut host = command
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    until_there(&scratch.path("rows"), &mut host);
+    Some((scratch, host))
+}
+
+/// Let a random part of an episode or two pass.
+fn pass_time(rng: &mut impl Rng) {
+    thread::sleep(Duration::from_millis(rng.random_range(0..1200)));
+}
+
+/// Whether all rows that a plant has measured are kept, but the two newest.
+fn rows_are_kept(scratch: &Scratch) {
+    // What `count` wrote before this episode's first row was sent may be of the one before.
+    let measured: usize = scratch.read("rows").parse().unwrap();
+    let kept = rows_of_newest(scratch);
+    assert!(kept + 2 >= measured, "{kept} of {measured} rows are kept");
 }
 
 #[test]
 fn a_host_that_is_killed_leaves_all_rows_but_the_newest() {
-    for kill in 0..20 {
-        let Some(words) = controlling("counting") else {
+    let mut rng = rng(1);
+    for _ in 0..kills() {
+        let Some((scratch, mut host)) = counting() else {
             return;
         };
-        let scratch = Scratch::new();
-        let mut command = scratch.command("");
-        let command = command
-            .args(&words)
-            .args(["--replan", "1", "--episodes", "99"]);
-        let mut host = command
-            .stderr(Stdio::null())
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
-        until_there(&scratch.path("rows"), &mut host);
-        thread::sleep(Duration::from_millis(53 * kill));
+        pass_time(&mut rng);
         host.kill().unwrap();
         host.wait().unwrap();
         // The plant ends when its input does; until then it may measure once more.
         thread::sleep(Duration::from_millis(200));
-        let measured: usize = scratch.read("rows").parse().unwrap();
-        let kept = rows_of_newest(&scratch);
-        assert!(kept + 2 >= measured, "{kept} of {measured} rows are kept");
+        rows_are_kept(&scratch);
     }
 }
 
 #[test]
-fn a_plant_that_is_killed_leaves_all_rows() {
-    for last in (3..200).step_by(9) {
-        let Some(words) = controlling(&format!("killed at {last}")) else {
+fn a_plant_that_is_killed_leaves_all_rows_but_the_newest() {
+    let mut rng = rng(2);
+    for _ in 0..kills() {
+        let Some((scratch, host)) = counting() else {
             return;
         };
-        let scratch = Scratch::new();
-        let output = scratch.command("").args(&words).output().unwrap();
+        pass_time(&mut rng);
+        let killed = Command::new("kill")
+            .args(["-9", &scratch.read("pid")])
+            .status();
+        assert!(killed.unwrap().success());
+        let output = host.wait_with_output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
         says(
             &said,
             &["the plant ended without a word (signal: 9 (SIGKILL))"],
         );
-        assert_eq!(rows_of_newest(&scratch), last - 1);
+        assert_eq!(output.status.code(), Some(2));
+        rows_are_kept(&scratch);
     }
+}
+
+/// The words that name a plant without faults.
+fn plant_of_rod() -> Option<String> {
+    controlling("none").map(|words| words[words.len() - 1].clone())
+}
+
+#[test]
+fn a_plant_in_another_process_is_recorded_under_a_multisine() {
+    let Some(plant) = plant_of_rod() else {
+        return;
+    };
+    let scratch = Scratch::new();
+    let simulate = |words: &str| {
+        let mut command = scratch.command(&format!("simulate {words} --out run.csv --plant"));
+        command.arg(&plant).output().unwrap()
+    };
+    for (words, message) in [
+        (
+            "--duration 2 --effect coulomb_friction=0.1",
+            "--effect is for a simulated rig",
+        ),
+        ("", "add --duration"),
+    ] {
+        let output = simulate(words);
+        assert_eq!(output.status.code(), Some(2));
+        says(&String::from_utf8_lossy(&output.stderr), &[message]);
+    }
+    let recorded = |seed: u32| {
+        let output = simulate(&format!("--duration 2 --seed {seed}"));
+        assert_eq!(output.status.code(), Some(0));
+        read_rig_log(scratch.path("run.csv"), 1, &Columns::default()).unwrap()
+    };
+    let log = recorded(1);
+    assert_eq!(log.rows(), 101);
+    let most = log.tau[0]
+        .iter()
+        .fold(0.0, |most: f64, tau| most.max(tau.abs()));
+    assert!((1.0..=3.0).contains(&most), "{most} of 3 N m");
+    assert_eq!(recorded(1).tau, log.tau);
+    assert_ne!(recorded(2).tau, log.tau);
+}
+
+#[test]
+fn learning_on_a_plant_in_another_process_goes_on_after_a_kill() {
+    let Some(plant) = plant_of_rod() else {
+        return;
+    };
+    let scratch = Scratch::new();
+    let mbrl = |out: &str| {
+        let config = "--config $REPO/configs/smoke/physics-prior-pendulum.toml";
+        let mut command = scratch.command(&format!("mbrl {config} --out {out} --plant"));
+        command
+            .arg(&plant)
+            .stderr(Stdio::null())
+            .stdout(Stdio::null());
+        command
+    };
+    assert!(mbrl("whole").status().unwrap().success());
+    let mut killed = mbrl("killed").spawn().unwrap();
+    until_there(&scratch.path("killed/rounds.jsonl"), &mut killed);
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    assert!(mbrl("killed").status().unwrap().success());
+    for file in ["rounds.jsonl", "stretch-001.csv", "stretch-004.csv"] {
+        let [whole, killed] = ["whole", "killed"].map(|run| scratch.read(&format!("{run}/{file}")));
+        assert_eq!(whole, killed, "{file}");
+    }
+}
+
+#[test]
+fn an_experiment_on_a_plant_in_another_process_compares_what_is_known() {
+    let Some(plant) = plant_of_rod() else {
+        return;
+    };
+    let scratch = Scratch::new();
+    let text = fs::read_to_string(ours("configs/smoke/physics-prior-pendulum.toml")).unwrap();
+    let text = text.replace("\"pendulum-real\"", &format!("{plant:?}"));
+    let run = |out: &str| {
+        let line = format!("experiment physics-prior --config c.toml --out {out} --json");
+        let output = scratch.command(&line).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    scratch.file("c.toml", &text);
+    let unknown = run("unknown");
+    assert!(unknown["methods"].get("perfect").is_none());
+    assert!(unknown["reached"]["hybrid"]["final_share_of_perfect"].is_null());
+    scratch.file("c.toml", format!("perfect = \"pendulum\"\n{text}"));
+    let known = run("known");
+    assert!(known["methods"]["perfect"]["return_mean"][0].is_number());
+    assert!(known["reached"]["hybrid"]["final_share_of_perfect"].is_number());
+    assert_eq!(known["methods"]["hybrid"], unknown["methods"]["hybrid"]);
 }

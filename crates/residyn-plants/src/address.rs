@@ -13,6 +13,15 @@ pub enum Address {
     Tcp(SocketAddr),
 }
 
+/// How far away a plant may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// On this machine.
+    Here,
+    /// On any machine, where anybody on the way can move it.
+    Anywhere,
+}
+
 /// Why a text is not the address of a plant.
 #[derive(Debug, Error)]
 pub enum AddressError {
@@ -26,11 +35,10 @@ pub enum AddressError {
 
 impl Address {
     /// The address in a text, `exec:COMMAND` or `tcp:HOST:PORT`; `None` if it names a file or a built-in plant.
-    /// `other_machines`: whether a plant may be on another machine, where anybody on the way can move it.
     ///
     /// # Errors
     /// What is wrong with an address, and the remedy.
-    pub fn in_text(text: &Path, other_machines: bool) -> Option<Result<Self, AddressError>> {
+    pub fn in_text(text: &Path, reach: Reach) -> Option<Result<Self, AddressError>> {
         let text = text.to_str()?;
         if let Some(command) = text.strip_prefix("exec:") {
             return Some(match command.trim() {
@@ -39,11 +47,11 @@ impl Address {
             });
         }
         let place = text.strip_prefix("tcp:")?;
-        Some(resolved(place, other_machines))
+        Some(resolved(place, reach))
     }
 }
 
-fn resolved(place: &str, other_machines: bool) -> Result<Address, AddressError> {
+fn resolved(place: &str, reach: Reach) -> Result<Address, AddressError> {
     let wrong = |source| AddressError::Place {
         place: place.to_owned(),
         source,
@@ -51,7 +59,7 @@ fn resolved(place: &str, other_machines: bool) -> Result<Address, AddressError> 
     let mut found = place.to_socket_addrs().map_err(wrong)?;
     let address = found.next();
     let address = address.ok_or_else(|| wrong(io::ErrorKind::HostUnreachable.into()))?;
-    match address.ip().is_loopback() || other_machines {
+    match address.ip().is_loopback() || reach == Reach::Anywhere {
         true => Ok(Address::Tcp(address)),
         false => Err(AddressError::OtherMachine(place.to_owned())),
     }
@@ -62,7 +70,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Option<Result<Address, String>> {
-        let found = Address::in_text(Path::new(text), false)?;
+        let found = Address::in_text(Path::new(text), Reach::Here)?;
         Some(found.map_err(|error| error.to_string()))
     }
 

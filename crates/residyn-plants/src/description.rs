@@ -1,5 +1,7 @@
 use serde::Deserialize;
 
+use super::controlled::Unsuited;
+use residyn_control::control::Task;
 use residyn_core::data::Quantity;
 use residyn_core::plant::check_step;
 
@@ -75,6 +77,36 @@ fn usual_brake_s() -> f64 {
 }
 
 impl Description {
+    /// Keep the commands of a task within this plant's limits.
+    ///
+    /// # Errors
+    /// Another step, or no command that both allow.
+    pub fn bound(&self, task: &mut Task) -> Result<(), Unsuited> {
+        if (task.step_s - self.step_s).abs() > 1e-9 * task.step_s {
+            return Err(Unsuited::Step {
+                task: task.name(),
+                step_s: task.step_s,
+                plant: self.name.clone(),
+                of_plant_s: self.step_s,
+            });
+        }
+        let name = task.name();
+        let limits = task.torque.iter_mut().zip(&self.limits.command);
+        for (joint, (planned, [low, high])) in (1..).zip(limits) {
+            *planned = [planned[0].max(*low), planned[1].min(*high)];
+            if !(planned[0] <= planned[1]) {
+                return Err(Unsuited::Range {
+                    task: name,
+                    plant: self.name.clone(),
+                    joint,
+                    low: *low,
+                    high: *high,
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// What is wrong with it.
     pub fn fault(&self) -> Option<String> {
         let joints = self.joints.len();

@@ -13,6 +13,8 @@ use super::message::{FromPlant, PROTOCOL, Row, ToPlant};
 use super::recorder::Recorder;
 use super::wire::Wire;
 
+/// What the plant is told of who asks.
+const PROGRAM: &str = concat!("residyn ", env!("CARGO_PKG_VERSION"));
 /// A plant may have to load much before it says hello.
 const GREETING: Duration = Duration::from_secs(60);
 /// A rig may have to swing out before an episode.
@@ -76,15 +78,15 @@ struct Episode {
 }
 
 impl Remote {
-    /// Start a plant or connect to it, and exchange hellos. `program` says who asks.
+    /// Start a plant or connect to it, and exchange hellos.
     ///
     /// # Errors
     /// A plant that cannot be reached, or whose hello is wrong.
-    pub fn open(address: &Address, program: &str) -> Result<Self, RemoteError> {
+    pub fn open(address: &Address) -> Result<Self, RemoteError> {
         let mut wire = Wire::open(address)?;
         wire.send(&ToPlant::Hello {
             protocol: PROTOCOL,
-            program,
+            program: PROGRAM,
         })?;
         let hello = match wire.receive(GREETING)? {
             FromPlant::Hello(hello) => *hello,
@@ -319,6 +321,10 @@ impl Driven for Remote {
     fn state(&self) -> &[f64] {
         let episode = self.episode.as_ref();
         &episode.expect("a plant is driven in an episode").state
+    }
+
+    fn safe(&self) -> Vec<f64> {
+        self.description.safe.clone()
     }
 
     fn step(&mut self, command: &[f64]) -> Result<Vec<f64>, DriveError> {

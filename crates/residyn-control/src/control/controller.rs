@@ -11,11 +11,12 @@ use residyn_core::sim::batch::{Block, Rollouts};
 /// Decides the torque of each step.
 pub trait Policy {
     /// The torque (N m or N, one per joint) to hold from `time_s` on, given the sensor readings `measured` (positions,
-    /// then velocities).
-    fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64>;
+    /// then velocities); `None` if there is none to be trusted: the plant then holds its safe one.
+    fn torque(&mut self, measured: &[f64], time_s: f64) -> Option<Vec<f64>>;
 
-    /// So many steps have passed in which the last torque was held on: the plant did not wait.
-    fn passed(&mut self, _steps: usize) {}
+    /// This was sent to the plant, whose limits may have changed it, and was held for so many steps: more than one if the
+    /// plant did not wait.
+    fn sent(&mut self, _torque: &[f64], _steps: usize) {}
 }
 
 /// A plan in which no candidate has a finite return.
@@ -29,7 +30,7 @@ pub struct LostPlan {
 }
 
 /// Model-predictive control with a receding horizon: the first steps of the best plan are executed; the rest of it
-/// initialises the search for the next.
+/// initialises the search for the next. A plan in which no candidate has a finite return is not executed.
 pub struct Controller<'p, 'r> {
     planner: &'p Planner<Block<'r>>,
     rollouts: &'r Rollouts,
@@ -41,7 +42,8 @@ pub struct Controller<'p, 'r> {
     executed: usize,
     /// The last torques, as many as the model's delays need.
     past: VecDeque<Vec<f64>>,
-    last: Vec<f64>,
+    /// The newest readings and their time.
+    at: (Vec<f64>, f64),
     decisions: usize,
     diverged: usize,
     lost: Vec<f64>,
@@ -65,7 +67,7 @@ impl<'p, 'r> Controller<'p, 'r> {
             plan: VecDeque::new(),
             executed: 0,
             past: VecDeque::new(),
-            last: Vec::new(),
+            at: (Vec::new(), 0.0),
             decisions: 0,
             diverged: 0,
             lost: Vec::new(),
@@ -96,10 +98,10 @@ impl<'p, 'r> Controller<'p, 'r> {
         lost.map_or(Ok(()), Err)
     }
 
-    /// The last torque acts for a step.
-    fn hold(&mut self) {
+    /// A torque acts for a step.
+    fn hold(&mut self, torque: &[f64]) {
         self.executed += 1;
-        self.past.push_back(self.last.clone());
+        self.past.push_back(torque.to_vec());
         if self.past.len() > self.rollouts.memory() {
             self.past.pop_front();
         }
@@ -115,33 +117,32 @@ impl<'p, 'r> Controller<'p, 'r> {
         let internal = self.observer.as_ref().map(Environment::internal);
         let state = [measured, &internal.unwrap_or_default()].concat();
         let plan = self.planner.plan(Start::after(&state, time_s, carried));
-        self.plan = plan.inputs.into_iter().take(self.replan).collect();
         self.decisions += 1;
         self.diverged += plan.diverged;
-        if !plan.best.is_finite() {
-            self.lost.push(time_s);
+        match plan.best.is_finite() {
+            true => self.plan = plan.inputs.into_iter().take(self.replan).collect(),
+            false => self.lost.push(time_s),
         }
     }
 }
 
 impl Policy for Controller<'_, '_> {
-    fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64> {
+    fn torque(&mut self, measured: &[f64], time_s: f64) -> Option<Vec<f64>> {
         if self.plan.is_empty() {
             self.decide(measured, time_s);
         }
-        let torque = self.plan.pop_front().expect("a plan has steps");
-        if let Some(observer) = &mut self.observer {
-            observer.step(&mut measured.to_vec(), &torque, time_s);
-        }
-        self.last.clone_from(&torque);
-        self.hold();
-        torque
+        self.at = (measured.to_vec(), time_s);
+        self.plan.pop_front()
     }
 
-    fn passed(&mut self, steps: usize) {
+    fn sent(&mut self, torque: &[f64], steps: usize) {
+        if let Some(observer) = &mut self.observer {
+            let (measured, time_s) = &self.at;
+            observer.step(&mut measured.clone(), torque, *time_s);
+        }
+        self.plan.drain(..self.plan.len().min(steps - 1));
         for _ in 0..steps {
-            self.plan.pop_front();
-            self.hold();
+            self.hold(torque);
         }
     }
 }
@@ -163,8 +164,8 @@ impl<'t, R: Rng> RandomTorque<'t, R> {
 }
 
 impl<R: Rng> Policy for RandomTorque<'_, R> {
-    fn torque(&mut self, _: &[f64], _: f64) -> Vec<f64> {
+    fn torque(&mut self, _: &[f64], _: f64) -> Option<Vec<f64>> {
         let draw = |[low, high]: &[f64; 2]| self.rng.random_range(*low..=*high);
-        self.ranges.iter().map(draw).collect()
+        Some(self.ranges.iter().map(draw).collect())
     }
 }

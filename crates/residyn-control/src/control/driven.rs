@@ -18,6 +18,9 @@ pub trait Driven {
     /// The true state, positions, then velocities, or what the sensors say where nobody knows it.
     fn state(&self) -> &[f64];
 
+    /// The torque or command to hold where no better one is known.
+    fn safe(&self) -> Vec<f64>;
+
     /// Hold a torque or command for a step; returns the one that the plant was sent, which its limits may have changed.
     ///
     /// # Errors
@@ -40,12 +43,12 @@ pub enum DriveError {
 }
 
 /// A simulated rig and the draws of its sensors' noise.
-pub struct Simulated<'r, 'd, R> {
-    pub rig: &'r mut Rig<'d>,
-    pub noise: &'r mut R,
+pub struct Simulated<'d, R> {
+    pub rig: Rig<'d>,
+    pub noise: R,
 }
 
-impl<R: Rng> Driven for Simulated<'_, '_, R> {
+impl<R: Rng> Driven for Simulated<'_, R> {
     fn empty_log(&self) -> Log {
         self.rig.empty_log()
     }
@@ -55,11 +58,16 @@ impl<R: Rng> Driven for Simulated<'_, '_, R> {
     }
 
     fn measure(&mut self) -> Vec<f64> {
-        self.rig.measure(self.noise)
+        self.rig.measure(&mut self.noise)
     }
 
     fn state(&self) -> &[f64] {
         self.rig.state()
+    }
+
+    /// Nothing.
+    fn safe(&self) -> Vec<f64> {
+        vec![0.0; self.rig.joints()]
     }
 
     fn step(&mut self, command: &[f64]) -> Result<Vec<f64>, DriveError> {

@@ -55,8 +55,8 @@ pub fn drive(
     for _ in 0..steps {
         let row = Row::of(plant);
         let command = policy.torque(&row.measured, row.time_s);
-        let sent = plant.step(&command)?;
-        policy.passed(plant.late());
+        let sent = plant.step(&command.unwrap_or_else(|| plant.safe()))?;
+        policy.sent(&sent, 1 + plant.late());
         stretch.push(row, &sent);
     }
     // No command in the last row.

@@ -16,10 +16,21 @@ pub struct Excitation {
 }
 
 /// One draw: amplitude, angular frequency and phase, `[joint][tone]`.
-pub(super) struct Tones(Vec<Vec<[f64; 3]>>);
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tones(Vec<Vec<[f64; 3]>>);
 
 impl Excitation {
-    pub(super) fn draw(&self, rng: &mut impl Rng) -> Tones {
+    /// Of a desktop rig, with an amplitude of 1 on each joint.
+    pub fn usual(joints: usize) -> Self {
+        Self {
+            amplitude: vec![1.0; joints],
+            band_hz: [0.1, 2.0],
+            tones: 8,
+        }
+    }
+
+    /// Draw frequencies and phases.
+    pub fn draw(&self, rng: &mut impl Rng) -> Tones {
         let [low, high] = self.band_hz;
         #[allow(clippy::cast_precision_loss)] // few tones
         let count = self.tones.max(1) as f64;

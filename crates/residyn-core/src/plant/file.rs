@@ -180,11 +180,7 @@ impl Plant {
             parameters: system.parameters.iter().map(|p| p.value).collect(),
             effects: system.effects.clone(),
             sensor: USUAL_SENSOR,
-            excitation: Excitation {
-                amplitude: vec![1.0; joints],
-                band_hz: [0.1, 2.0],
-                tones: 8,
-            },
+            excitation: Excitation::usual(joints),
             recording: Recording {
                 logs: 1,
                 duration_s: 20.0,

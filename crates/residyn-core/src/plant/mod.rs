@@ -6,7 +6,7 @@ mod rig;
 mod sampling;
 mod simulate;
 
-pub use excitation::Excitation;
+pub use excitation::{Excitation, Tones};
 pub use file::{HiddenEffect, Plant, PlantError, Sensor};
 pub use rig::{Noise, Rig};
 pub use sampling::check_step;

@@ -59,6 +59,11 @@ impl<'d> Rig<'d> {
         }
     }
 
+    /// Number of its joints.
+    pub fn joints(&self) -> usize {
+        self.joints
+    }
+
     /// The true state: positions, then velocities.
     pub fn state(&self) -> &[f64] {
         &self.state

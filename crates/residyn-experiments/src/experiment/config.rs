@@ -5,9 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use super::ExperimentError;
 use residyn_core::limits::RUNS;
-use residyn_core::model::MlpSettings;
+use residyn_core::model::{Library, MlpSettings, Model};
+use residyn_core::plant::Plant;
 use residyn_core::toml_text::from_toml;
-use residyn_io::files::read_text;
+use residyn_io::files::{beside_or_named, read_text};
+use residyn_io::{read_model, read_plant};
+use residyn_plants::Controlled;
 use residyn_train::FitSettings;
 use residyn_train::recipe::RecipeError;
 
@@ -17,8 +20,12 @@ use residyn_train::recipe::RecipeError;
 pub struct Config {
     /// A task file, relative to this file, or the name of a built-in task.
     pub task: PathBuf,
-    /// A plant file, relative to this file, or the name of a built-in plant.
+    /// A plant file, relative to this file, or the name of a built-in plant; or a plant in another process.
     pub plant: PathBuf,
+    /// The true equations of a plant in another process, where they are known: a plant or model file, relative to this file,
+    /// or the name of a built-in one. Without them no perfect model is compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub perfect: Option<PathBuf>,
     /// Number of consecutive seeds; each method is repeated with each of them.
     pub seeds: u64,
     /// Transitions under random torques, before the first training.
@@ -64,6 +71,39 @@ impl Config {
         path.clone_into(&mut config.path);
         config.check().map_err(|message| config.wrong(message))?;
         Ok(config)
+    }
+
+    /// The equations of `plant`, if they are known.
+    pub(super) fn truth(
+        &self,
+        plant: &Controlled,
+        library: &Library,
+    ) -> Result<Option<Plant>, ExperimentError> {
+        match (plant, &self.perfect) {
+            (Controlled::Simulated(simulation), None) => Ok(Some(simulation.plant.clone())),
+            (Controlled::Simulated(_), Some(_)) => {
+                let fault = "`perfect` is for a plant in another process; this one has its equations in `plant`";
+                Err(self.wrong(fault.into()))
+            }
+            (Controlled::Elsewhere(_), Some(file)) => Ok(Some(read_plant(
+                &beside_or_named(&self.path, file),
+                library,
+            )?)),
+            (Controlled::Elsewhere(_), None) => Ok(None),
+        }
+    }
+
+    /// The equations of the first method that has some, for a plant that says nothing of its own.
+    pub(super) fn declared(&self, library: &Library) -> Result<Model, ExperimentError> {
+        let mut files = self
+            .method
+            .iter()
+            .filter_map(|method| method.model.as_ref());
+        let file = files.next().ok_or_else(|| {
+            let fault = "a plant in another process says nothing of its equations; give a method a `model`, or name `perfect`";
+            self.wrong(fault.into())
+        })?;
+        Ok(read_model(beside_or_named(&self.path, file), library)?)
     }
 
     pub(super) fn wrong(&self, message: String) -> ExperimentError {

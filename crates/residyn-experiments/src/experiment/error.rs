@@ -8,6 +8,7 @@ use residyn_core::closeloop::StudyError;
 use residyn_core::model::FileError;
 use residyn_core::plant::PlantError;
 use residyn_io::runs::RunFolderError;
+use residyn_plants::ControlledError;
 use residyn_train::CheckpointError;
 use residyn_train::recipe::RecipeError;
 
@@ -39,6 +40,8 @@ pub enum ExperimentError {
     Task(#[from] TaskError),
     #[error(transparent)]
     Plant(#[from] PlantError),
+    #[error("{0}")]
+    Controlled(#[from] ControlledError),
 }
 
 impl ExperimentError {

@@ -10,6 +10,7 @@ use super::results::{Course, PERFECT, PRIOR};
 use super::{ExperimentError, Observer, Session};
 use crate::mbrl::{EpisodeScore, Evaluator, RunError};
 use residyn_control::control::Predictor;
+use residyn_core::plant::Plant;
 use residyn_io::runs::{RunFolder, Shard};
 
 /// A method with one seed. It runs in its own folder, where its results are found again.
@@ -27,7 +28,7 @@ enum Actor<'s> {
     /// The prior of a method, without learning.
     Prior(&'s Method),
     /// The plant's own equations.
-    Perfect,
+    Perfect(&'s Plant),
 }
 
 /// Number of real transitions and score: one for each amount of data or each receding horizon.
@@ -38,7 +39,7 @@ impl Piece<'_> {
     pub fn rounds(&self) -> usize {
         match self.actor {
             Actor::Learner(method) => method.config.rounds,
-            Actor::Prior(_) | Actor::Perfect => 0,
+            Actor::Prior(_) | Actor::Perfect(_) => 0,
         }
     }
 }
@@ -48,7 +49,7 @@ impl Actor<'_> {
         match self {
             Self::Learner(method) => &method.config.name,
             Self::Prior(_) => PRIOR,
-            Self::Perfect => PERFECT,
+            Self::Perfect(_) => PERFECT,
         }
     }
 }
@@ -58,8 +59,8 @@ impl Session {
     pub(super) fn pieces(&self) -> Vec<Piece<'_>> {
         let learners: Vec<_> = self.methods.iter().map(Actor::Learner).collect();
         let prior = self.methods.iter().find(|method| method.has_prior());
-        let others: Vec<_> = [Actor::Perfect]
-            .into_iter()
+        let perfect = self.truth.as_ref().map(Actor::Perfect);
+        let others: Vec<_> = (perfect.into_iter())
             .chain(prior.map(Actor::Prior))
             .collect();
         let mut pieces = Vec::new();
@@ -82,7 +83,7 @@ impl Session {
         observer: Observer<'_>,
     ) -> Result<BTreeMap<String, Vec<Entries>>, ExperimentError> {
         let pieces: Vec<Piece<'_>> = shard.share(self.pieces()).collect();
-        let done = pieces.par_iter().with_max_len(1).map(|piece| {
+        let done = self.each(&pieces, |piece| {
             let name = piece.actor.name();
             let own = folder.within(format!("runs/{name}-{:02}", piece.seed));
             let entries = self.do_piece(*piece, horizons, &own, observer);
@@ -91,8 +92,7 @@ impl Session {
                 seed: piece.seed,
                 source,
             })
-        });
-        let done: Vec<Entries> = done.collect::<Result<_, _>>()?;
+        })?;
         let mut by_method = BTreeMap::<String, Vec<Entries>>::new();
         for (piece, entries) in pieces.iter().zip(done) {
             let name = piece.actor.name().to_owned();
@@ -110,7 +110,7 @@ impl Session {
     ) -> Result<Entries, RunError> {
         let (seen, predictor) = match piece.actor {
             Actor::Learner(method) => {
-                let run = self.run_of(method, piece.seed);
+                let run = self.run_of(method, piece.seed, own);
                 let TrainedMethod { rounds, model, .. } =
                     method.learn(&run, own.clone(), observer)?;
                 if horizons.is_none() {
@@ -123,19 +123,30 @@ impl Session {
                 (seen, method.predictor(&model))
             }
             Actor::Prior(method) => (0, method.prior(self.task.integrator)?),
-            Actor::Perfect => (0, self.perfect()),
+            // Integrated like the models' equations.
+            Actor::Perfect(plant) => (
+                0,
+                Predictor::of_equations(plant.dynamics(), self.task.integrator),
+            ),
         };
         let horizons = horizons.unwrap_or(slice::from_ref(&self.task.replan));
         let score = |replan: &usize| {
             let score = self.score(piece.seed, &predictor, *replan, own);
             score.map(|score| (seen, score))
         };
-        horizons.par_iter().with_max_len(1).map(score).collect()
+        self.each(horizons, score)
     }
 
-    /// The plant's own equations, integrated like the models' equations.
-    fn perfect(&self) -> Predictor {
-        Predictor::of_equations(self.plant.dynamics(), self.task.integrator)
+    /// What `act` makes of each item, at the same time if there are several plants.
+    fn each<T: Sync, R: Send, E: Send>(
+        &self,
+        items: &[T],
+        act: impl Fn(&T) -> Result<R, E> + Sync + Send,
+    ) -> Result<Vec<R>, E> {
+        match self.plant.is_single() {
+            true => items.iter().map(act).collect(),
+            false => items.par_iter().with_max_len(1).map(act).collect(),
+        }
     }
 
     /// The score of a model, stored or else from an episode.

@@ -57,7 +57,7 @@ pub struct Reached {
     /// Smallest number of transitions with a mean return of 90 % of the perfect model's; none if not reached.
     pub transitions_to_90_percent: Option<usize>,
     /// Its final mean return, as a fraction of the perfect model's.
-    pub final_share_of_perfect: f64,
+    pub final_share_of_perfect: Option<f64>,
     /// Number of seeds whose last episode is a success.
     pub final_successes: usize,
     /// Number of seeds whose final return is higher than that of the prior without learning; none without a prior.
@@ -97,9 +97,13 @@ impl Results {
     }
 
     fn reached(&self, course: &Course) -> Reached {
-        let perfect = self.methods[PERFECT].return_mean[0];
+        let perfect = self
+            .methods
+            .get(PERFECT)
+            .map(|perfect| perfect.return_mean[0]);
         let entries = course.transitions.iter().zip(&course.return_mean);
-        let mut enough = entries.filter(|(_, mean)| **mean >= REACHED * perfect);
+        let is_enough = |mean: f64| perfect.is_some_and(|perfect| mean >= REACHED * perfect);
+        let mut enough = entries.filter(|(_, mean)| is_enough(**mean));
         let last = course.returns.len() - 1;
         let above = |prior: &Course| {
             let pairs = course.returns[last].iter().zip(&prior.returns[0]);
@@ -110,7 +114,7 @@ impl Results {
                 Some(_) => None,
                 None => enough.next().map(|(transitions, _)| *transitions),
             },
-            final_share_of_perfect: course.return_mean[last] / perfect,
+            final_share_of_perfect: perfect.map(|perfect| course.return_mean[last] / perfect),
             final_successes: course.successes(last),
             seeds_above_prior: self.methods.get(PRIOR).map(above),
         }
@@ -123,6 +127,16 @@ impl Results {
                 let best = |name: &String| format!("{name} {}", self.methods[name].best(horizons));
                 let what = "receding horizon with the highest return, in steps".to_owned();
                 (what, self.reached.keys().map(best).collect())
+            }
+            None if !self.methods.contains_key(PERFECT) => {
+                let last = |name: &String| {
+                    let returns = &self.methods[name].return_mean;
+                    format!("{name} {:.1}", returns[returns.len() - 1])
+                };
+                (
+                    "return at the end".to_owned(),
+                    self.reached.keys().map(last).collect(),
+                )
             }
             None => {
                 let after = |(name, reached): (&String, &Reached)| {
@@ -170,11 +184,10 @@ impl Results {
         for (name, course) in &self.methods {
             let last = course.returns.len() - 1;
             let (share, after) = match self.reached.get(name) {
-                Some(reached) => {
-                    let share = format!("{:.3}", reached.final_share_of_perfect);
-                    (share, self.after(name, reached))
+                Some(reached) if let Some(share) = reached.final_share_of_perfect => {
+                    (format!("{share:.3}"), self.after(name, reached))
                 }
-                None => Default::default(),
+                _ => Default::default(),
             };
             let _ = writeln!(
                 out,

@@ -9,15 +9,17 @@ use residyn_control::control::Task;
 use residyn_core::model::{FittedEffect, Library};
 use residyn_core::plant::Plant;
 use residyn_io::files::beside_or_named;
-use residyn_io::read_plant;
 use residyn_io::runs::{Identity, RunFolder, Shard};
+use residyn_plants::{Controlled, Reach, Unsuited};
 use residyn_train::Backend;
 
 /// A configuration with everything it refers to read.
 pub struct Session {
     pub config: Config,
     pub(super) task: Task,
-    pub(super) plant: Plant,
+    pub(super) plant: Controlled,
+    /// The plant's own equations, if they are known.
+    pub(super) truth: Option<Plant>,
     pub(super) methods: Vec<Method>,
     backend: Backend,
     first_seed: u64,
@@ -27,23 +29,15 @@ impl Session {
     /// Reads everything that `config` refers to. The seeds are `first_seed` and those that follow.
     ///
     /// # Errors
-    /// Files that cannot be read or do not match.
+    /// Files that cannot be read or do not match, and a plant that cannot be reached.
     pub fn open(
         config: Config,
         library: &Library,
         backend: Backend,
         first_seed: u64,
+        reach: Reach,
     ) -> Result<Self, ExperimentError> {
-        let task = Task::read(&beside_or_named(&config.path, &config.task))?;
-        let plant = read_plant(&beside_or_named(&config.path, &config.plant), library)?;
-        if plant.system.name != task.system || plant.system.joints != task.joints() {
-            return Err(config.wrong(format!(
-                "the task {} is for {}, but the plant is {}; name a plant of that system",
-                task.name(),
-                task.system,
-                plant.system.name
-            )));
-        }
+        let mut task = Task::read(&beside_or_named(&config.path, &config.task))?;
         if task.steps % config.gather != 0 {
             return Err(config.wrong(format!(
                 "`gather` is {}, but an episode of {} has {} steps; choose a divisor of it",
@@ -52,13 +46,37 @@ impl Session {
                 task.steps
             )));
         }
+        let plant = Controlled::open(&config.plant, Some(&config.path), library, reach)?;
+        let truth = config.truth(&plant, library)?;
+        let system = match &truth {
+            Some(plant) => plant.system.clone(),
+            None => config.declared(library)?,
+        };
+        if system.name != task.system || system.joints != task.joints() {
+            return Err(config.wrong(format!(
+                "the task {} is for {}, but the plant is {}; name a plant of that system",
+                task.name(),
+                task.system,
+                system.name
+            )));
+        }
+        let unsuited = |error: Unsuited| config.wrong(error.to_string());
+        plant.bound(&mut task, &system).map_err(unsuited)?;
+        if plant.moves_by_itself() && config.gather != task.steps {
+            return Err(config.wrong(format!(
+                "`gather` is {}, but a plant that moves by itself cannot be stopped within an episode; gather whole ones of \
+                 {} steps",
+                config.gather, task.steps
+            )));
+        }
         let methods = (config.method.iter())
-            .map(|method| Method::read(method, &config, &plant.system, library, backend))
+            .map(|method| Method::read(method, &config, &system, library, backend))
             .collect::<Result<_, _>>()?;
         Ok(Self {
             config,
             task,
             plant,
+            truth,
             methods,
             backend,
             first_seed,
@@ -101,7 +119,7 @@ impl Session {
         let mut resolved = self.resolved();
         resolved["method"] = json!(method.config.name);
         folder.claim(&self.identity("mbrl", resolved))?;
-        let run = self.run_of(method, self.first_seed);
+        let run = self.run_of(method, self.first_seed, folder);
         let learnt = method.learn(&run, folder.clone(), observer);
         let failed = |source| ExperimentError::Run {
             method: method.config.name.clone(),
@@ -140,12 +158,19 @@ impl Session {
         json!({
             "config": self.config,
             "task": self.task,
-            "plant": {
-                "model": self.plant.system.declaration,
-                "parameters": self.plant.parameters,
-                "effects": self.plant.effects.iter().map(effect).collect::<Vec<_>>(),
-            },
+            "plant": self.plant.description().map_or_else(|| self.truth(), |plant| json!({"name": plant.name})),
             "device": self.backend.name(),
+        })
+    }
+
+    /// The plant's own equations, as far as they are known.
+    fn truth(&self) -> Value {
+        self.truth.as_ref().map_or(Value::Null, |plant| {
+            json!({
+                "model": plant.system.declaration,
+                "parameters": plant.parameters,
+                "effects": plant.effects.iter().map(effect).collect::<Vec<_>>(),
+            })
         })
     }
 
@@ -154,7 +179,12 @@ impl Session {
         numbers.map(|k| self.first_seed.wrapping_add(k)).collect()
     }
 
-    pub(super) fn run_of<'a>(&'a self, method: &'a Method, seed: u64) -> Run<'a> {
+    pub(super) fn run_of<'a>(
+        &'a self,
+        method: &'a Method,
+        seed: u64,
+        folder: &RunFolder,
+    ) -> Run<'a> {
         Run {
             task: &self.task,
             plant: &self.plant,
@@ -165,6 +195,7 @@ impl Session {
                 rounds: method.config.rounds,
             },
             seed,
+            folder: folder.path().to_owned(),
         }
     }
 }

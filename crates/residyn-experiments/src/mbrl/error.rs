@@ -2,7 +2,6 @@ use thiserror::Error;
 
 use residyn_control::control::{DriveError, EpisodeError, LostPlan};
 use residyn_core::data::LogError;
-use residyn_core::plant::PlantError;
 use residyn_io::WriteLogError;
 use residyn_io::runs::RunFolderError;
 use residyn_train::{CheckpointError, HybridError, SegmentsError, TrainError};
@@ -11,13 +10,16 @@ use residyn_train::{CheckpointError, HybridError, SegmentsError, TrainError};
 #[derive(Debug, Error)]
 pub enum RunError {
     #[error("{0}")]
-    Plant(#[from] PlantError),
-    #[error("{0}")]
     Drive(#[from] DriveError),
     #[error("{0}")]
     Episode(#[from] EpisodeError),
     #[error("{0}")]
     Plan(#[from] LostPlan),
+    #[error(
+        "the plant does not repeat its motion, so that an episode cannot be continued after a training; gather whole \
+         episodes: let `gather` be the task's `steps`"
+    )]
+    NotRepeated,
     #[error("{0}")]
     Train(#[from] TrainError),
     #[error(transparent)]

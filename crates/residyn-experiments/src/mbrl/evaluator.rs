@@ -1,16 +1,16 @@
 use serde::{Deserialize, Serialize};
 
 use super::RunError;
-use residyn_control::control::{Episode, Predictor, Simulated, Task, episode, with_controller};
-use residyn_core::plant::Plant;
+use residyn_control::control::{Episode, Predictor, Task, episode, with_controller};
 use residyn_core::streams::{Purpose, stream};
+use residyn_plants::{Beginning, Controlled, plant_seed};
 
 /// Evaluates models as controllers, in episodes that are not used for training. Initial state, sensor noise and the
 /// planner's random numbers are the same for every model, so that results differ by the model alone.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Evaluator<'a> {
     pub task: &'a Task,
-    pub plant: &'a Plant,
+    pub plant: &'a Controlled,
     pub seed: u64,
 }
 
@@ -30,7 +30,7 @@ impl Evaluator<'_> {
     /// Evaluates a model in an episode, planning anew every `replan` steps.
     ///
     /// # Errors
-    /// A plant that diverges, and a plan whose candidates all diverge.
+    /// A plant that diverges or no longer answers, and a plan whose candidates all diverge.
     pub fn score(&self, predictor: &Predictor, replan: usize) -> Result<EpisodeScore, RunError> {
         let (episode, diverged) = self.episode(predictor, replan)?;
         Ok(EpisodeScore {
@@ -43,25 +43,29 @@ impl Evaluator<'_> {
     /// The whole episode, and the number of candidate plans that diverged.
     ///
     /// # Errors
-    /// A plant that diverges, and a plan whose candidates all diverge.
+    /// As [`Evaluator::score`].
     pub fn episode(
         &self,
         predictor: &Predictor,
         replan: usize,
     ) -> Result<(Episode, usize), RunError> {
-        let dynamics = self.plant.dynamics();
-        let mut rng = stream(self.seed, Purpose::Judge(0));
-        let start = self.task.draw_start(&mut rng);
-        let mut rig = self.task.rig(self.plant, &dynamics, &start);
-        let draws = stream(self.seed, Purpose::JudgePlan(0));
-        with_controller(predictor, self.task, replan, &draws, |controller| {
-            let mut plant = Simulated {
-                rig: &mut rig,
-                noise: &mut rng,
-            };
-            let episode = episode(self.task, &mut plant, controller)?;
-            controller.check()?;
-            Ok((episode, controller.diverged()))
+        let mut noise = stream(self.seed, Purpose::Judge(0));
+        let start = self.task.draw_start(&mut noise);
+        let beginning = Beginning {
+            task: self.task,
+            start: &start,
+            seed: plant_seed(&noise),
+            noise,
+            log: None,
+        };
+        let plans = stream(self.seed, Purpose::JudgePlan(0));
+        let predictor = &predictor.clone().acting_after(self.plant.latency());
+        self.plant.during(beginning, |plant| {
+            with_controller(predictor, self.task, replan, &plans, |controller| {
+                let episode = episode(self.task, plant, controller)?;
+                controller.check()?;
+                Ok((episode, controller.diverged()))
+            })
         })
     }
 }

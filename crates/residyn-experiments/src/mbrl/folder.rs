@@ -1,5 +1,5 @@
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{Round, Run, RunError, RunState};
 use residyn_core::data::{Columns, Log};
@@ -16,6 +16,11 @@ const ROUNDS: &str = "rounds.jsonl";
 pub struct Folder {
     folder: RunFolder,
     rounds: Vec<Round>,
+}
+
+/// Where a run in `folder` keeps the recorded motion of this number.
+pub(super) fn stretch(folder: &Path, number: usize) -> PathBuf {
+    folder.join(format!("stretch-{number:03}.csv"))
 }
 
 impl Folder {
@@ -111,7 +116,7 @@ impl Folder {
     }
 
     fn stretch(&self, number: usize) -> PathBuf {
-        self.folder.path().join(format!("stretch-{number:03}.csv"))
+        stretch(self.folder.path(), number)
     }
 
     fn write_stretch(&self, log: &Log, number: usize) -> Result<(), RunError> {

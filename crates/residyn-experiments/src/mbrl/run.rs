@@ -1,12 +1,18 @@
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 
+use super::folder::stretch;
 use super::{EpisodeScore, Evaluator, Learner, RunError, transitions};
-use residyn_control::control::{Predictor, RandomTorque, Simulated, Task, drive, with_controller};
+use residyn_control::control::{Driven, Predictor, RandomTorque, Task, drive, with_controller};
 use residyn_core::data::Log;
-use residyn_core::model::Dynamics;
-use residyn_core::plant::{Plant, Rig};
 use residyn_core::streams::{Purpose, stream};
+use residyn_plants::{Beginning, Controlled, plant_seed};
 use residyn_train::{HybridModel, Training};
+
+/// How far a plant in another process may be from where it was when its motion is repeated, as a share of 1 or of the value:
+/// a number is told in 17 digits.
+const REPEATED: f64 = 1e-9;
 
 /// The amounts of data, in transitions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,10 +29,12 @@ pub struct Schedule {
 /// One run of the loop on one plant: everything that determines its results.
 pub struct Run<'a> {
     pub task: &'a Task,
-    pub plant: &'a Plant,
+    pub plant: &'a Controlled,
     pub learner: &'a Learner,
     pub schedule: Schedule,
     pub seed: u64,
+    /// Where the recorded motion is kept: by a plant in another process, row by row.
+    pub folder: PathBuf,
 }
 
 /// The state of a run between two rounds.
@@ -61,19 +69,14 @@ impl Run<'_> {
     /// Gathers data under random torques, before the first round.
     ///
     /// # Errors
-    /// A plant that diverges.
+    /// A plant that diverges or no longer answers.
     pub fn begin(&self) -> Result<RunState, RunError> {
-        let dynamics = self.plant.dynamics();
-        let mut rig = self.rig(&dynamics, 0);
         let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random(0)));
-        let mut noise = stream(self.seed, Purpose::Gather(0));
-        let mut plant = Simulated {
-            rig: &mut rig,
-            noise: &mut noise,
-        };
-        let stretch = drive(&mut plant, &mut random, self.schedule.random)?;
+        let log = self.stretch(0, 0, |plant| {
+            Ok(drive(plant, &mut random, self.schedule.random)?.log)
+        })?;
         Ok(RunState {
-            logs: vec![stretch.log],
+            logs: vec![log],
             ..RunState::default()
         })
     }
@@ -81,7 +84,7 @@ impl Run<'_> {
     /// Carries out a round: train, evaluate, gather.
     ///
     /// # Errors
-    /// A loss that is not finite, a plant that diverges, and a plan whose candidates all diverge.
+    /// A loss that is not finite, a plant that diverges or no longer answers, and a plan whose candidates all diverge.
     pub fn round(&self, state: &mut RunState) -> Result<(Round, Training), RunError> {
         let (round, seed) = (state.rounds, self.seed);
         let segments = transitions(&state.logs, self.task.joints())?;
@@ -114,48 +117,68 @@ impl Run<'_> {
         }
     }
 
+    /// The next stretch of the episode, or the first of the next one.
     fn gather(&self, predictor: &Predictor, state: &RunState) -> Result<Log, RunError> {
-        let dynamics = self.plant.dynamics();
-        let mut rig = self.rig_now(&dynamics, state)?;
-        let of_round = |purpose: fn(usize) -> Purpose| stream(self.seed, purpose(state.rounds + 1));
-        let (mut noise, draws) = (of_round(Purpose::Gather), of_round(Purpose::GatherPlan));
-        let steps = self.schedule.gather;
-        with_controller(
-            predictor,
-            self.task,
-            self.task.replan,
-            &draws,
-            |controller| {
-                let mut plant = Simulated {
-                    rig: &mut rig,
-                    noise: &mut noise,
-                };
-                let stretch = drive(&mut plant, controller, steps)?;
-                controller.check()?;
-                Ok(stretch.log)
-            },
-        )
-    }
-
-    /// The plant in the state at the end of the last stretch under control, restored by replaying the torques of the
-    /// episode so far. After the end of an episode, the plant in a new initial state.
-    fn rig_now<'d>(&self, dynamics: &'d Dynamics, state: &RunState) -> Result<Rig<'d>, RunError> {
         let of_episode = self.task.steps / self.schedule.gather;
         let (episode, begun) = (state.rounds / of_episode, state.rounds % of_episode);
-        let mut rig = self.rig(dynamics, 1 + episode);
-        let controlled = &state.logs[1..];
-        for log in &controlled[controlled.len() - begun..] {
-            for row in 0..log.rows() - 1 {
-                let held: Vec<f64> = log.tau.iter().map(|tau| tau[row]).collect();
-                rig.step(&held)?;
-            }
-        }
-        Ok(rig)
+        let before = &state.logs[state.logs.len() - begun..];
+        let plans = stream(self.seed, Purpose::GatherPlan(state.rounds + 1));
+        let predictor = &predictor.clone().acting_after(self.plant.latency());
+        self.stretch(1 + episode, state.rounds + 1, |plant| {
+            self.repeat(plant, before)?;
+            with_controller(
+                predictor,
+                self.task,
+                self.task.replan,
+                &plans,
+                |controller| {
+                    let stretch = drive(plant, controller, self.schedule.gather)?;
+                    controller.check()?;
+                    Ok(stretch.log)
+                },
+            )
+        })
     }
 
-    fn rig<'d>(&self, dynamics: &'d Dynamics, number: usize) -> Rig<'d> {
-        let mut rng = stream(self.seed, Purpose::Start(number));
-        let start = self.task.draw_start(&mut rng);
-        self.task.rig(self.plant, dynamics, &start)
+    /// Bring a plant at the beginning of an episode to the end of its last stretch.
+    fn repeat(&self, plant: &mut dyn Driven, before: &[Log]) -> Result<(), RunError> {
+        for log in before {
+            for row in 0..log.rows() - 1 {
+                let held: Vec<f64> = log.tau.iter().map(|tau| tau[row]).collect();
+                plant.step(&held)?;
+            }
+        }
+        let Some(last) = before.last().filter(|_| self.plant.description().is_some()) else {
+            return Ok(());
+        };
+        let ended = last
+            .q
+            .iter()
+            .chain(&last.qd)
+            .map(|column| column[last.rows() - 1]);
+        let mut apart = plant.state().iter().zip(ended);
+        match apart.all(|(now, then)| (now - then).abs() <= REPEATED * (1.0 + then.abs())) {
+            true => Ok(()),
+            false => Err(RunError::NotRepeated),
+        }
+    }
+
+    /// What `act` records in an episode of this number, as the stretch of this number.
+    fn stretch(
+        &self,
+        episode: usize,
+        number: usize,
+        act: impl FnOnce(&mut dyn Driven) -> Result<Log, RunError>,
+    ) -> Result<Log, RunError> {
+        let mut draws = stream(self.seed, Purpose::Start(episode));
+        let start = self.task.draw_start(&mut draws);
+        let beginning = Beginning {
+            task: self.task,
+            start: &start,
+            noise: stream(self.seed, Purpose::Gather(number)),
+            seed: plant_seed(&draws),
+            log: Some(&stretch(&self.folder, number)),
+        };
+        self.plant.during(beginning, act)
     }
 }

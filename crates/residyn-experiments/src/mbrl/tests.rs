@@ -8,9 +8,10 @@ use super::{Folder, Learner, Prior, Round, Run, RunState, Schedule, transitions}
 use residyn_control::control::Task;
 use residyn_core::data::Joint;
 use residyn_core::model::{Angles, Dynamics, Library, MlpSettings, Origin};
-use residyn_core::plant::{Noise, Plant};
+use residyn_core::plant::Noise;
 use residyn_io::read_plant;
 use residyn_io::runs::RunFolder;
+use residyn_plants::Controlled;
 use residyn_train::{Backend, FitSettings, Penalty};
 
 fn folder(dir: &Path) -> Folder {
@@ -19,7 +20,8 @@ fn folder(dir: &Path) -> Folder {
 
 struct Setting {
     task: Task,
-    plant: Plant,
+    plant: Controlled,
+    declaration: String,
     learner: Learner,
     dynamics: Dynamics,
 }
@@ -47,6 +49,7 @@ fn setting() -> Setting {
         )
         .unwrap();
     let dynamics = plant.system.dynamics();
+    let declaration = plant.system.declaration.clone();
     let network = MlpSettings {
         hidden: vec![4],
         angles: Angles::SinCos,
@@ -67,14 +70,15 @@ fn setting() -> Setting {
     };
     Setting {
         task,
-        plant,
+        plant: plant.into(),
+        declaration,
         learner,
         dynamics,
     }
 }
 
 impl Setting {
-    fn run(&self) -> Run<'_> {
+    fn run(&self, folder: &Path) -> Run<'_> {
         Run {
             task: &self.task,
             plant: &self.plant,
@@ -85,14 +89,14 @@ impl Setting {
                 rounds: 5,
             },
             seed: 4,
+            folder: folder.to_owned(),
         }
     }
 
-    fn rounds(&self, state: &mut RunState, folder: &mut Folder, until: usize) {
-        let run = self.run();
+    fn rounds(&self, run: &Run<'_>, state: &mut RunState, folder: &mut Folder, until: usize) {
         let origin = Origin {
             config: json!({}),
-            model_toml: self.plant.system.declaration.clone(),
+            model_toml: self.declaration.clone(),
             ..Origin::of_seed(4)
         };
         while state.rounds < until {
@@ -103,13 +107,14 @@ impl Setting {
 
     fn in_sessions(&self, ends: &[usize]) -> (Vec<Round>, Vec<f64>) {
         let dir = tempfile::tempdir().unwrap();
+        let run = self.run(dir.path());
         for end in ends {
             let mut folder = folder(dir.path());
-            let mut state = folder.state(&self.run(), &self.dynamics).unwrap();
-            self.rounds(&mut state, &mut folder, *end);
+            let mut state = folder.state(&run, &self.dynamics).unwrap();
+            self.rounds(&run, &mut state, &mut folder, *end);
         }
         let folder = folder(dir.path());
-        let state = folder.state(&self.run(), &self.dynamics).unwrap();
+        let state = folder.state(&run, &self.dynamics).unwrap();
         let logs = state.logs;
         (
             folder.rounds().to_vec(),
@@ -138,8 +143,9 @@ fn a_round_that_was_not_recorded_is_repeated_from_the_previous_model() {
     let (killed, further) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let go_on = |dir: &Path, until| {
         let mut folder = folder(dir);
-        let mut state = folder.state(&setting.run(), &setting.dynamics).unwrap();
-        setting.rounds(&mut state, &mut folder, until);
+        let run = setting.run(dir);
+        let mut state = folder.state(&run, &setting.dynamics).unwrap();
+        setting.rounds(&run, &mut state, &mut folder, until);
         folder
     };
     // The state after a kill between writing the third model and writing its line.
@@ -170,7 +176,7 @@ fn a_stretch_begins_where_the_last_one_ended() {
 #[test]
 fn runs_of_one_trained_prior_do_not_block_each_other() {
     let mut setting = setting();
-    let begun = setting.run().begin().unwrap();
+    let begun = setting.run(Path::new("")).begin().unwrap();
     let segments = transitions(&begun.logs, 1).unwrap();
     let trained = setting.learner.learn(&segments, None, 0, 0).unwrap();
     setting.learner.prior = Prior::Trained(Box::new(trained.result().unwrap()));

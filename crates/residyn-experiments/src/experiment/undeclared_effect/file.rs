@@ -43,6 +43,10 @@ pub struct Case {
     pub parameters: BTreeMap<String, f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<HiddenEffect>,
+    /// The plant itself, in another process; `parameters` and `effects` are then what is known of it. Without it, the plant is
+    /// simulated with these.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plant: Option<PathBuf>,
 }
 
 impl Experiment {

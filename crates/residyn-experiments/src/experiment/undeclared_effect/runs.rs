@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::{Experiment, Results, Session, Trial};
 use crate::experiment::ExperimentError;
 use residyn_io::runs::{Identity, RunFolder, Shard};
+use residyn_plants::Controlled;
 
 /// The contents of `runs/CASE-SEED.json`: a trial and the case that it belongs to.
 #[derive(Serialize, Deserialize)]
@@ -50,7 +51,10 @@ impl Session {
             observer(&trial);
             Ok(trial)
         };
-        trials.par_iter().map(trial).collect()
+        match self.plants.iter().any(Controlled::is_single) {
+            true => trials.iter().map(trial).collect(),
+            false => trials.par_iter().map(trial).collect(),
+        }
     }
 
     /// The case and the seed of each trial.

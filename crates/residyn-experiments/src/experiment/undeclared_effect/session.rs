@@ -6,6 +6,7 @@ use residyn_core::plant::Plant;
 use residyn_io::files::beside_or_named;
 use residyn_io::read_model;
 use residyn_io::read_plant;
+use residyn_plants::{Controlled, Reach};
 use residyn_train::Backend;
 
 /// An experiment with everything it refers to read and checked.
@@ -14,8 +15,10 @@ pub struct Session {
     pub library: Library,
     pub declared: Model,
     pub task: Task,
-    /// One for each case.
-    pub plants: Vec<Plant>,
+    /// The plants with what is known of them, one for each case.
+    pub truths: Vec<Plant>,
+    /// What is controlled, one for each case.
+    pub plants: Vec<Controlled>,
     /// The backend that hybrids are trained on.
     pub backend: Backend,
     /// The first of the consecutive seeds.
@@ -32,6 +35,7 @@ impl Session {
         library: Library,
         backend: Backend,
         first_seed: u64,
+        reach: Reach,
     ) -> Result<Self, ExperimentError> {
         let model = beside_or_named(&experiment.path, &experiment.model);
         let declared = read_model(&model, &library)?;
@@ -42,7 +46,7 @@ impl Session {
                 task.system, declared.name
             )));
         }
-        let plant = |case: &Case| -> Result<Plant, ExperimentError> {
+        let truth = |case: &Case| -> Result<Plant, ExperimentError> {
             let wrong =
                 |message: String| experiment.wrong(format!("case `{}`: {message}", case.name));
             let mut plant =
@@ -53,9 +57,24 @@ impl Session {
             hidden.map_err(|error| wrong(error.to_string()))?;
             Ok(plant)
         };
-        let plants = experiment
-            .cases
-            .iter()
+        let truths: Vec<Plant> = (experiment.cases.iter())
+            .map(truth)
+            .collect::<Result<_, _>>()?;
+        let plant = |(case, truth): (&Case, &Plant)| -> Result<Controlled, ExperimentError> {
+            let Some(place) = &case.plant else {
+                return Ok(truth.clone().into());
+            };
+            let plant = Controlled::open(place, Some(&experiment.path), &library, reach)?;
+            let mut same = task.clone();
+            let bound = plant.bound(&mut same, &declared);
+            let fault = match bound {
+                Ok(()) if same.torque == task.torque => return Ok(plant),
+                Ok(()) => "its limits are narrower than `torque` of the task".to_owned(),
+                Err(unsuited) => unsuited.to_string(),
+            };
+            Err(experiment.wrong(format!("case `{}`: {fault}", case.name)))
+        };
+        let plants = (experiment.cases.iter().zip(&truths))
             .map(plant)
             .collect::<Result<_, _>>()?;
         Ok(Self {
@@ -63,6 +82,7 @@ impl Session {
             library,
             declared,
             task,
+            truths,
             plants,
             backend,
             first_seed,

@@ -120,7 +120,7 @@ impl Session {
                 })
             };
         let declared = self.predictor(self.declared.dynamics());
-        let truth = self.predictor(self.plants[case].dynamics());
+        let truth = self.predictor(self.truths[case].dynamics());
         let mut scores = vec![score(PlanningModel::Declared, 0, &declared)?];
         let mut closed = Vec::new();
         let mut logs = Vec::new();
