@@ -6,12 +6,15 @@ use std::thread;
 use std::time::Duration;
 
 use rand::{Rng, RngExt};
+use residyn_control::control::Task;
 use residyn_core::data::Columns;
+use residyn_core::model::Library;
 use residyn_core::rng;
-use residyn_io::read_rig_log;
+use residyn_experiments::experiment::{Config, undeclared_effect};
+use residyn_io::{read_plant, read_rig_log};
 use serde_json::Value;
 
-use crate::support::clients::interpreter_for;
+use crate::support::clients::{interpreter_for, plants_in};
 use crate::support::paths::ours;
 use crate::support::tables::{rows, says_words};
 use crate::support::{Scratch, says, until_there};
@@ -187,6 +190,57 @@ fn a_plan_that_diverges_is_never_sent() {
     );
     let log = read_rig_log(scratch.path("e/episode-000.csv"), 1, &Columns::default()).unwrap();
     assert!(log.tau[0].iter().all(|tau| *tau == 0.0));
+}
+
+#[test]
+fn what_a_model_in_mujoco_hides_is_named_after_an_episode_and_planned_with() {
+    let scratch = Scratch::new();
+    let Some(environment) = plants_in(&scratch.path("")) else {
+        return;
+    };
+    let config = fs::read_to_string(ours("configs/elsewhere/pendulum.toml")).unwrap();
+    let config = config.replace("seeds = 10", "seeds = 1");
+    scratch.file("c.toml", config.replace("epochs = 4000", "epochs = 20"));
+    fs::create_dir_all(scratch.path("configs/elsewhere")).unwrap();
+    let xml = "configs/elsewhere/pendulum.xml";
+    fs::copy(ours(xml), scratch.path(xml)).unwrap();
+    let mut command =
+        scratch.command("experiment undeclared-effect --config c.toml --out x --json");
+    let output = command.envs(environment).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let case = &found["cases"][0];
+    let of = |model: &str| {
+        let mut models = case["models"].as_array().unwrap().iter();
+        let of_model = models.find(|entry| entry["model"] == model).unwrap();
+        of_model["mean"].as_f64().unwrap()
+    };
+    let [declared, closed, truth] = ["declared", "closed", "true"].map(of);
+    assert!(
+        declared < 100.0 && closed >= 0.99 * truth,
+        "{declared} {closed} {truth}"
+    );
+    let named = case["closed"][0][0]["effects"].as_array().unwrap();
+    let named: Vec<&str> = named.iter().map(|e| e["name"].as_str().unwrap()).collect();
+    assert_eq!(named, ["actuator_delay", "coulomb_friction"]);
+}
+
+#[test]
+fn every_experiment_on_plants_in_other_processes_can_be_read() {
+    let entries = fs::read_dir(ours("configs/elsewhere")).unwrap();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    for path in paths.filter(|path| path.extension() == Some("toml".as_ref())) {
+        let name = path.file_stem().unwrap().to_string_lossy();
+        match name.rsplit_once('-') {
+            Some((_, "learning")) => drop(Config::read(&path).unwrap()),
+            Some((_, "plant" | "declared")) => {
+                drop(read_plant(&path, &Library::built_in()).unwrap());
+            }
+            Some((_, "task")) => drop(Task::read(&path).unwrap()),
+            _ => drop(undeclared_effect::Experiment::read(&path).unwrap()),
+        }
+    }
 }
 
 /// Number of kills in each test of them: `RESIDYN_KILLS`, or enough to see that they are survived.

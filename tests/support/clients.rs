@@ -1,7 +1,9 @@
 //! Other programs that read what Residyn writes. A test whose program is missing says so loudly, and passes.
 
 use std::ffi::OsString;
+use std::fs;
 use std::io::Write;
+use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
@@ -24,6 +26,26 @@ pub fn interpreter_for(script: &str) -> Option<OsString> {
         let _ = std::io::stderr().write_all(note.as_bytes());
     }
     python
+}
+
+/// The interpreter with `residyn.plants` from the sources, for plants of MuJoCo and Gymnasium; the variables of
+/// its environment. `None` without an interpreter.
+pub fn plants_in(folder: &Path) -> Option<[(&'static str, OsString); 2]> {
+    let python = interpreter_for("plants in MuJoCo")?;
+    // The package without its compiled part, which plants do not need.
+    let package = folder.join("package/residyn");
+    fs::create_dir_all(&package).unwrap();
+    let plants = package.join("plants");
+    if !plants.exists() {
+        symlink(ours("python/residyn/plants"), plants).unwrap();
+    }
+    let programs = Path::new(&python).parent().unwrap();
+    let path = std::env::var("PATH").unwrap();
+    let path = format!("{}:{path}", programs.display());
+    Some([
+        ("PYTHONPATH", folder.join("package").into()),
+        ("PATH", path.into()),
+    ])
 }
 
 /// Run one of the scripts in `tests/clients`, if there is an interpreter.

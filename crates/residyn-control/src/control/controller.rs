@@ -19,11 +19,11 @@ pub trait Policy {
     fn sent(&mut self, _torque: &[f64], _steps: usize) {}
 }
 
-/// A plan in which no candidate has a finite return.
+/// An episode of plans in which no candidate has a finite return.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
-    "no candidate plan at {time_s:.3} s has a finite return: all of them reach numbers that are not finite; fix the \
-     model or the objective of the task, or shorten the planner's horizon"
+    "no candidate plan at {time_s:.3} s has a finite return, nor at any time after it: all of them reach numbers that are not \
+     finite; fix the model or the objective of the task, or shorten the planner's horizon"
 )]
 pub struct LostPlan {
     pub time_s: f64,
@@ -89,13 +89,15 @@ impl<'p, 'r> Controller<'p, 'r> {
         &self.lost
     }
 
-    /// Whether all plans had a candidate with a finite return.
+    /// Whether any plan had a candidate with a finite return.
     ///
     /// # Errors
-    /// The first plan that had none.
+    /// The first plan, if none had.
     pub fn check(&self) -> Result<(), LostPlan> {
-        let lost = self.lost.first().map(|&time_s| LostPlan { time_s });
-        lost.map_or(Ok(()), Err)
+        match self.lost.first() {
+            Some(&time_s) if self.lost.len() == self.decisions => Err(LostPlan { time_s }),
+            _ => Ok(()),
+        }
     }
 
     /// A torque acts for a step.

@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::RunError;
-use residyn_control::control::{Episode, Predictor, Task, episode, with_controller};
+use residyn_control::control::{Controller, Episode, Predictor, Task, episode, with_controller};
 use residyn_core::streams::{Purpose, stream};
 use residyn_plants::{Beginning, Controlled, plant_seed};
 
@@ -24,31 +24,39 @@ pub struct EpisodeScore {
     pub success: bool,
     /// Number of candidate plans whose rollout diverged.
     pub diverged: usize,
+    /// Number of plans whose candidates all diverged: the plant held its safe command.
+    #[serde(default)]
+    pub lost: usize,
 }
 
 impl Evaluator<'_> {
     /// Evaluates a model in an episode, planning anew every `replan` steps.
     ///
     /// # Errors
-    /// A plant that diverges or no longer answers, and a plan whose candidates all diverge.
+    /// A plant that diverges or no longer answers, and an episode in which the candidates of all plans diverge.
     pub fn score(&self, predictor: &Predictor, replan: usize) -> Result<EpisodeScore, RunError> {
-        let (episode, diverged) = self.episode(predictor, replan)?;
-        Ok(EpisodeScore {
+        self.drive(predictor, replan, |episode, controller| EpisodeScore {
             total: episode.total(),
             success: episode.success,
-            diverged,
+            diverged: controller.diverged(),
+            lost: controller.lost().len(),
         })
     }
 
-    /// The whole episode, and the number of candidate plans that diverged.
+    /// The whole episode.
     ///
     /// # Errors
     /// As [`Evaluator::score`].
-    pub fn episode(
+    pub fn episode(&self, predictor: &Predictor, replan: usize) -> Result<Episode, RunError> {
+        self.drive(predictor, replan, |episode, _| episode)
+    }
+
+    fn drive<T>(
         &self,
         predictor: &Predictor,
         replan: usize,
-    ) -> Result<(Episode, usize), RunError> {
+        tell: impl FnOnce(Episode, &Controller<'_, '_>) -> T,
+    ) -> Result<T, RunError> {
         let mut noise = stream(self.seed, Purpose::Judge(0));
         let start = self.task.draw_start(&mut noise);
         let beginning = Beginning {
@@ -64,7 +72,7 @@ impl Evaluator<'_> {
             with_controller(predictor, self.task, replan, &plans, |controller| {
                 let episode = episode(self.task, plant, controller)?;
                 controller.check()?;
-                Ok((episode, controller.diverged()))
+                Ok(tell(episode, controller))
             })
         })
     }

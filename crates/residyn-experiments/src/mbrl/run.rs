@@ -84,7 +84,8 @@ impl Run<'_> {
     /// Carries out a round: train, evaluate, gather.
     ///
     /// # Errors
-    /// A loss that is not finite, a plant that diverges or no longer answers, and a plan whose candidates all diverge.
+    /// A loss that is not finite, a plant that diverges or no longer answers, and a stretch in which the
+    /// candidates of all plans diverge.
     pub fn round(&self, state: &mut RunState) -> Result<(Round, Training), RunError> {
         let (round, seed) = (state.rounds, self.seed);
         let segments = transitions(&state.logs, self.task.joints())?;

@@ -182,7 +182,7 @@ impl Session {
         number: usize,
     ) -> Result<Log, RunError> {
         let seed = stream(evaluator.seed, Purpose::Gather(number)).next_u64();
-        let (episode, _) = Evaluator { seed, ..evaluator }.episode(model, self.task.replan)?;
+        let episode = Evaluator { seed, ..evaluator }.episode(model, self.task.replan)?;
         let mut log = episode.stretch.log;
         log.path = format!("episode{}.csv", number + 1).into();
         Ok(log)
