@@ -1,0 +1,23 @@
+//! Optimal excitation: motions that a rig can follow within its limits and that determine a model's parameters, and tell its
+//! alternatives apart, best.
+
+mod balance;
+mod bounds;
+mod clearance;
+mod criterion;
+mod descent;
+mod design;
+mod error;
+mod fourier;
+mod limits;
+mod motion;
+mod parameters;
+mod problem;
+mod record;
+
+pub use bounds::Use;
+pub use criterion::{Criterion, log_condition, log_determinant};
+pub use design::{Compared, Design, Drives, Expected, Progress, Settings, design, random_motion};
+pub use error::ExciteError;
+pub use limits::{Cuboid, JointLimits, Limits, Sphere};
+pub use parameters::Sum;
