@@ -42,9 +42,9 @@ impl Default for Settings {
     /// With more harmonics, starts or steps the criterion changed by less than a percent on arms of one to seven joints.
     fn default() -> Self {
         Self {
-            harmonics: 10,
-            starts: 8,
-            steps: 50,
+            harmonics: 15,
+            starts: 12,
+            steps: 100,
             criterion: log_determinant,
         }
     }
@@ -120,6 +120,8 @@ pub struct Design {
     pub evidence: Vec<f64>,
     /// How much of each limit the motion uses.
     pub uses: Vec<Use>,
+    /// The least distance between spheres, or between them and boxes, m; `None` without any.
+    pub clearance_m: Option<f64>,
 }
 
 /// What `command` holds.
@@ -449,6 +451,7 @@ impl<'a> Search<'a> {
             unseen: problem.parameters.unseen(&base),
             evidence,
             uses,
+            clearance_m: problem.least_distance(&x),
         })
     }
 }

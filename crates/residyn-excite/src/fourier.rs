@@ -48,7 +48,7 @@ impl Series {
             .map(turning)
             .fold(0.0, f64::max)
             .min(HIGHEST_HZ);
-        let top = (top_hz * duration_s).max(3.0);
+        let top = (top_hz * duration_s).ceil().max(3.0);
         let count = count.max(3);
         let place = |k: usize| top.powf(k as f64 / (count - 1) as f64);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

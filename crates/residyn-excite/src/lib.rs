@@ -10,8 +10,10 @@ mod design;
 mod error;
 mod fourier;
 mod limits;
+mod logged;
 mod motion;
 mod parameters;
+mod picture;
 mod problem;
 mod record;
 
@@ -20,4 +22,6 @@ pub use criterion::{Criterion, log_condition, log_determinant};
 pub use design::{Compared, Design, Drives, Expected, Progress, Settings, design, random_motion};
 pub use error::ExciteError;
 pub use limits::{Cuboid, JointLimits, Limits, Sphere};
+pub use logged::{Collinear, Excitation, GravitySweep, NextRun, OneWay, excitation};
 pub use parameters::Sum;
+pub use picture::picture;

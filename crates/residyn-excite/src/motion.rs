@@ -58,7 +58,8 @@ pub fn information(model: &Model, log: &Log, limits: &Limits) -> Result<DMatrix<
 pub fn evidence(model: &Model, log: &Log, limits: &Limits) -> Result<f64, ExciteError> {
     let logs = std::slice::from_ref(log);
     let dynamics = model.dynamics();
-    let shooting = shooting(logs, limits, &dynamics);
+    // The rows around a start are the window's own: its estimate is no further evidence.
+    let shooting = shooting(logs, limits, &dynamics).with_free_starts();
     let active: Vec<usize> = (0..dynamics.parameters.len())
         .filter(|k| !dynamics.parameters[*k].fixed)
         .collect();

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
+use residyn_core::decomposition::least_squares;
 use residyn_core::model::Model;
 
 use crate::balance::{Along, Balance, Weights};
@@ -26,6 +27,8 @@ const STATES: usize = 400;
 const TRIED: usize = 500;
 /// Evidence that counts as none.
 const NO_EVIDENCE: f64 = 1e-6;
+/// Singular values below this share of the largest one are rounding.
+const ROUNDING: f64 = 1e-10;
 /// Overlap of spheres that counts like the excess of a limit by all of it, m.
 const DEEP_M: f64 = 0.1;
 /// Halvings of the interval in which the largest admissible size of a motion is sought.
@@ -219,6 +222,64 @@ impl Problem {
         }
     }
 
+    /// The information of rows, of which these count, on all columns in units of their magnitudes.
+    pub fn information(&self, along: &Along, counts: &[bool]) -> DMatrix<f64> {
+        let regressor = self.counted(along, counts);
+        regressor.tr_mul(&regressor)
+    }
+
+    /// The regressor of all columns without the rows that do not count (`[row * joints + joint]`).
+    fn counted(&self, along: &Along, counts: &[bool]) -> DMatrix<f64> {
+        let all: Vec<usize> = (0..self.parameters.active.len()).collect();
+        let mut regressor = self.regressor(along, &all);
+        for (row, counts) in counts.iter().enumerate() {
+            if !counts {
+                regressor.row_mut(row).fill(0.0);
+            }
+        }
+        regressor
+    }
+
+    /// What the best fit of the base leaves of a difference of torques, N m (or N); zero where rows do not count.
+    pub fn left_by_fit(&self, along: &Along, difference: &[f64], counts: &[bool]) -> Vec<f64> {
+        let n = self.joints();
+        let regressor = self.counted(along, counts);
+        let own = regressor.select_columns(&self.base.columns);
+        let scaled = DVector::from_fn(difference.len(), |k, _| match counts[k] {
+            true => difference[k] * self.weights[k % n].sqrt(),
+            false => 0.0,
+        });
+        let explained = least_squares(own.clone(), &scaled, ROUNDING);
+        let left = explained.map_or(scaled.clone(), |explained| scaled - own * explained);
+        let unscaled = left
+            .iter()
+            .enumerate()
+            .map(|(k, value)| value / self.weights[k % n].sqrt());
+        unscaled.collect()
+    }
+
+    /// Take each joint's torque to have this noise, N m (or N).
+    pub fn weigh_by(&mut self, noise: &[f64]) {
+        self.weights = noise.iter().map(|noise| noise.powi(-2)).collect();
+    }
+
+    /// The information of a motion that is run through this many times more slowly, as far as the duration reaches.
+    pub fn information_slowed(&self, coefficients: &[f64], slower: f64) -> DMatrix<f64> {
+        let rows = self.grid.times.len();
+        let step_s = self.series.duration_s / (rows - 1) as f64 / slower;
+        let slowed = self
+            .series
+            .grid((0..rows).map(|row| row as f64 * step_s).collect());
+        let mut motion = self.series.motion(&slowed, coefficients);
+        for (power, channel) in motion.iter_mut().enumerate() {
+            channel
+                .iter_mut()
+                .for_each(|value| *value /= slower.powi(power as i32));
+        }
+        let along = self.balance.along(&slowed.times, &motion);
+        self.information(&along, &vec![true; along.drive.torque.len()]) * self.rows_of_one
+    }
+
     /// The evidence for a difference of torques (`[row * joints + joint]`, N m or N) that is given along these rows.
     pub fn evidence_of(&self, along: &Along, difference: &[f64], rows_of_one: f64) -> f64 {
         let n = self.joints();
@@ -401,6 +462,14 @@ impl Problem {
         all.all(|is_clear| is_clear)
     }
 
+    /// The least distance between spheres, or between them and boxes, along a motion, m.
+    pub fn least_distance(&self, coefficients: &[f64]) -> Option<f64> {
+        let motion = self.series.motion(&self.fine, coefficients);
+        let rows = motion[0].chunks_exact(self.joints());
+        rows.flat_map(|q| self.clearance.distances(q))
+            .reduce(f64::min)
+    }
+
     /// The same motion, made so much smaller, towards rest, that it keeps all limits.
     pub fn within(&self, coefficients: &[f64]) -> Vec<f64> {
         self.within_on(&self.fine, coefficients)
@@ -429,6 +498,12 @@ impl Problem {
 
     /// A random motion that reaches a limit, on the rows of the search: phases and amplitudes differ between joints.
     pub fn random(&self, rng: &mut impl Rng) -> Vec<f64> {
+        let all: Vec<usize> = (0..self.joints()).collect();
+        self.random_of(&all, rng)
+    }
+
+    /// The same with these joints in motion alone.
+    pub fn random_of(&self, joints: &[usize], rng: &mut impl Rng) -> Vec<f64> {
         let mut coefficients = self.rest.clone();
         let functions = self.series.functions() as f64;
         let more = self.series.coefficients() - coefficients.len();
@@ -436,6 +511,12 @@ impl Problem {
             let normal: f64 = StandardNormal.sample(rng);
             LARGE * normal / functions.sqrt()
         }));
+        let own = coefficients[self.joints()..].chunks_exact_mut(self.series.functions());
+        for (joint, own) in own.enumerate() {
+            if !joints.contains(&joint) {
+                own.fill(0.0);
+            }
+        }
         self.within_on(&self.grid, &coefficients)
     }
 

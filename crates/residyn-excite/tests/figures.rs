@@ -51,14 +51,6 @@ fn time() {
         match found {
             Ok(found) => {
                 print(name, &found, time_s);
-                if name == "pendulum" {
-                    println!(
-                        "{:?} {:?} {:?}",
-                        found.uses,
-                        found.expected,
-                        found.q[0].iter().step_by(50).collect::<Vec<_>>()
-                    );
-                }
             }
             Err(error) => println!("{name}: {error}"),
         }
@@ -68,6 +60,34 @@ fn time() {
                 Ok(found) => print("  random", &found, start.elapsed().as_secs_f64()),
                 Err(error) => println!("{name}: {error}"),
             }
+        }
+    }
+}
+
+/// What more harmonics, starts or steps are worth.
+#[test]
+#[ignore = "minutes"]
+fn effort() {
+    for (name, model, limits, duration_s) in rigs() {
+        for (harmonics, starts, steps) in [
+            (10, 8, 50),
+            (6, 8, 50),
+            (15, 8, 50),
+            (20, 8, 50),
+            (10, 32, 50),
+            (10, 8, 200),
+        ] {
+            let settings = Settings {
+                harmonics,
+                starts,
+                steps,
+                ..Settings::default()
+            };
+            let start = Instant::now();
+            let found = design(&model, &[], &limits, duration_s, &settings, 1, &|_| ()).unwrap();
+            let time_s = start.elapsed().as_secs_f64();
+            println!("{harmonics} harmonics, {starts} starts, {steps} steps");
+            print(name, &found, time_s);
         }
     }
 }
