@@ -18,7 +18,7 @@ use crate::bounds::{LIMITED, Use};
 use crate::criterion::{Criterion, log_determinant};
 use crate::descent::descend;
 use crate::error::ExciteError;
-use crate::fourier::Series;
+use crate::fourier::{Motion, Series};
 use crate::limits::Limits;
 use crate::motion;
 use crate::parameters::{Base, Sum};
@@ -124,6 +124,16 @@ pub struct Design {
     pub clearance_m: Option<f64>,
 }
 
+/// What a given motion tells: see [`Design`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Judged {
+    pub log_determinant: f64,
+    pub condition: f64,
+    pub expected: Vec<Expected>,
+    /// At its rows.
+    pub uses: Vec<Use>,
+}
+
 /// What `command` holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -146,31 +156,12 @@ pub fn design(
     seed: u64,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Design, ExciteError> {
-    let search = Search::new(model, alternatives, limits, duration_s, settings, seed)?;
-    let best = search.best(settings, seed, progress)?;
-    search.outcome(&best)
+    Designer::new(model, alternatives, limits, duration_s, settings)?.best(seed, progress)
 }
 
-/// A random motion within the limits, and what it is expected to tell: what designs are compared with.
-///
-/// # Errors
-/// As [`design`].
-pub fn random_motion(
-    model: &Model,
-    alternatives: &[Model],
-    limits: &Limits,
-    duration_s: f64,
-    settings: &Settings,
-    seed: u64,
-) -> Result<Design, ExciteError> {
-    // The sums of parameters are those of the designs.
-    let search = Search::new(model, alternatives, limits, duration_s, settings, 0)?;
-    let random = search.problem.random(&mut stream(seed, Purpose::Other(0)));
-    search.outcome(&random)
-}
-
-/// A search for the motion of one model.
-struct Search<'a> {
+/// Motions of one model within limits: the best one, random ones and given ones.
+pub struct Designer<'a> {
+    settings: Settings,
     model: &'a Model,
     alternatives: &'a [Model],
     limits: &'a Limits,
@@ -179,14 +170,17 @@ struct Search<'a> {
     compared: Vec<usize>,
 }
 
-impl<'a> Search<'a> {
-    fn new(
+impl<'a> Designer<'a> {
+    /// See [`design`].
+    ///
+    /// # Errors
+    /// As [`design`].
+    pub fn new(
         model: &'a Model,
         alternatives: &'a [Model],
         limits: &'a Limits,
         duration_s: f64,
         settings: &Settings,
-        seed: u64,
     ) -> Result<Self, ExciteError> {
         let has_states =
             |effect: &&residyn_core::model::FittedEffect| !effect.effect.states.is_empty();
@@ -212,10 +206,12 @@ impl<'a> Search<'a> {
         let compared: Vec<usize> = (0..alternatives.len()).filter(plain).collect();
         let own: Vec<Model> = compared.iter().map(|k| alternatives[*k].clone()).collect();
         let series = Series::new(&limits.joints, duration_s, settings.harmonics);
-        let mut rng = stream(seed, Purpose::Other(0));
+        // The sums of parameters do not depend on the seed of a design.
+        let mut rng = stream(0, Purpose::Other(0));
         let way = (series, settings.criterion);
         let problem = Problem::new(model, &own, limits, duration_s, way, &mut rng)?;
         Ok(Self {
+            settings: settings.clone(),
             model,
             alternatives,
             limits,
@@ -224,13 +220,71 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// The coefficients of the best motion found.
-    fn best(
+    /// The best motion found from a seed.
+    ///
+    /// # Errors
+    /// A rig whose simulation diverges or leaves its limits at rest.
+    pub fn best(
         &self,
-        settings: &Settings,
+        seed: u64,
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Design, ExciteError> {
+        self.outcome(&self.coefficients(seed, progress)?)
+    }
+
+    /// A random motion within the limits, which it reaches: what designs are compared with.
+    ///
+    /// # Errors
+    /// As [`Designer::best`].
+    pub fn random(&self, seed: u64) -> Result<Design, ExciteError> {
+        let mut rng = stream(seed, Purpose::Other(0));
+        self.outcome(&self.problem.random(&mut rng))
+    }
+
+    /// What a given motion tells by its torques: `[joint][row]` of position, speed and acceleration, one row each step of the
+    /// limits.
+    ///
+    /// # Errors
+    /// A motion that shows too little.
+    pub fn judge(&self, given: [&[Vec<f64>]; 3]) -> Result<Judged, ExciteError> {
+        let problem = &self.problem;
+        let rows = given[0].first().map_or(0, Vec::len);
+        let step_s = self.limits.step_s;
+        let jerk = |joint: usize, row: usize| {
+            let channel = &given[2][joint];
+            let (before, after) = (row.saturating_sub(1), (row + 1).min(rows - 1));
+            (channel[after] - channel[before]) / (step_s * (after - before).max(1) as f64)
+        };
+        let motion: Motion = std::array::from_fn(|derivative| {
+            let at = |row: usize, joint: usize| match given.get(derivative) {
+                Some(channel) => channel[joint][row],
+                None => jerk(joint, row),
+            };
+            let joints = self.model.joints;
+            let rows = (0..rows).flat_map(|row| (0..joints).map(move |joint| (row, joint)));
+            rows.map(|(row, joint)| at(row, joint)).collect()
+        });
+        let times: Vec<f64> = (0..rows).map(|row| row as f64 * step_s).collect();
+        let along = problem.balance.along(&times, &motion);
+        let own = problem
+            .base
+            .of(&problem.told_along(&along, 1.0).information);
+        let (mean, _) = log_determinant(&own).ok_or(ExciteError::NothingShown)?;
+        Ok(Judged {
+            log_determinant: -mean * own.nrows() as f64,
+            condition: condition(&own),
+            expected: expected(&problem.base, &own),
+            uses: problem.bounds.uses(&motion, &along.drive),
+        })
+    }
+
+    /// The coefficients of the best motion.
+    fn coefficients(
+        &self,
         seed: u64,
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<Vec<f64>, ExciteError> {
+        let settings = &self.settings;
         let problem = &self.problem;
         let done = AtomicUsize::new(0);
         let all = settings.starts + FINALISTS.min(settings.starts);
@@ -345,7 +399,7 @@ impl<'a> Search<'a> {
     }
 
     /// The rows of a motion as a log.
-    fn log_of(&self, times: &[f64], motion: &crate::fourier::Motion, command: &[f64]) -> Log {
+    fn log_of(&self, times: &[f64], motion: &Motion, command: &[f64]) -> Log {
         let n = self.model.joints;
         let by_joint = |channel: &[f64]| by_joint(channel, n);
         Log {

@@ -19,7 +19,9 @@ mod record;
 
 pub use bounds::Use;
 pub use criterion::{Criterion, log_condition, log_determinant};
-pub use design::{Compared, Design, Drives, Expected, Progress, Settings, design, random_motion};
+pub use design::{
+    Compared, Design, Designer, Drives, Expected, Judged, Progress, Settings, design,
+};
 pub use error::ExciteError;
 pub use limits::{Cuboid, JointLimits, Limits, Sphere};
 pub use logged::{Collinear, Excitation, GravitySweep, NextRun, OneWay, excitation};

@@ -1,5 +1,8 @@
 //! Expected intervals and evidence are those of fits to simulated logs with noise.
 
+// In tests a panic is the message.
+#![allow(clippy::unwrap_used)]
+
 mod support;
 
 use rand_distr::{Distribution, Normal};

@@ -1,5 +1,8 @@
 //! Designed motions keep every limit, at their rows and between them.
 
+// In tests a panic is the message.
+#![allow(clippy::unwrap_used)]
+
 mod support;
 
 use nalgebra::Vector3;
@@ -8,9 +11,7 @@ use residyn_core::data::Joint;
 use residyn_core::model::Model;
 use residyn_core::model::tree::Pose;
 use residyn_core::rng;
-use residyn_excite::{
-    Cuboid, Design, ExciteError, Limits, Settings, Sphere, design, random_motion,
-};
+use residyn_excite::{Cuboid, Design, Designer, ExciteError, Limits, Settings, Sphere, design};
 use support::{arm_limits, chain, effect, joint, limits, model, with};
 
 /// Points between two rows.
@@ -234,9 +235,10 @@ fn an_arm_keeps_off_the_table() {
 #[test]
 fn designed_motions_tell_more_than_random_ones() {
     let (model, limits) = (chain(4), arm_limits(4, 90.0));
-    let best = design(&model, &[], &limits, 6.0, &quick(), 1, &|_| ()).unwrap();
+    let designer = Designer::new(&model, &[], &limits, 6.0, &quick()).unwrap();
+    let best = designer.best(1, &|_| ()).unwrap();
     for seed in 0..20 {
-        let random = random_motion(&model, &[], &limits, 6.0, &quick(), seed).unwrap();
+        let random = designer.random(seed).unwrap();
         assert!(best.log_determinant > random.log_determinant);
     }
 }

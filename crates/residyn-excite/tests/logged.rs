@@ -1,10 +1,13 @@
 //! What logs cannot tell is found.
 
+// In tests a panic is the message.
+#![allow(clippy::unwrap_used)]
+
 mod support;
 
 use residyn_core::data::{Joint, Log};
 use residyn_core::model::Model;
-use residyn_excite::{Settings, excitation, random_motion};
+use residyn_excite::{Designer, Settings, excitation};
 use support::{arm_limits, chain, effect, with};
 
 fn arm() -> Model {
@@ -59,15 +62,9 @@ fn log(model: &Model, angle: impl Fn(usize, f64) -> f64) -> Log {
 #[test]
 fn a_rich_log_leaves_nothing_to_say() {
     let model = arm();
-    let motion = random_motion(
-        &model,
-        &[],
-        &arm_limits(4, 90.0),
-        10.0,
-        &Settings::default(),
-        1,
-    )
-    .unwrap();
+    let (limits, settings) = (arm_limits(4, 90.0), Settings::default());
+    let designer = Designer::new(&model, &[], &limits, 10.0, &settings).unwrap();
+    let motion = designer.random(1).unwrap();
     let rich = motion.recorded_by(&model).unwrap();
     let found = excitation(&model, &[rich]).unwrap();
     assert!(

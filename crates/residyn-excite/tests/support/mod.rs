@@ -13,10 +13,7 @@ use residyn_excite::{JointLimits, Limits};
 /// A built-in system, or a model file below the root of the project.
 pub fn model(name: &str) -> Model {
     let library = Library::built_in();
-    if !Path::new(name)
-        .extension()
-        .is_some_and(|ending| ending == "toml")
-    {
+    if Path::new(name).extension().is_none() {
         return library.model(name).unwrap();
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
