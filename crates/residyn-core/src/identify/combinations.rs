@@ -219,7 +219,7 @@ fn identifiable_at_most(columns: &Columns<'_>) -> usize {
 }
 
 /// A body's magnitude of each kind: mass, mass times radius of gyration, and mass times that radius squared.
-fn sizes(declared: &Model, body: &[usize; PARTS]) -> [f64; PARTS] {
+pub fn sizes(declared: &Model, body: &[usize; PARTS]) -> [f64; PARTS] {
     let value = |part: usize| declared.parameters[body[part]].value.abs();
     let (mass, trace) = (value(0), value(4) + value(7) + value(9));
     std::array::from_fn(|part| match part {
@@ -231,7 +231,7 @@ fn sizes(declared: &Model, body: &[usize; PARTS]) -> [f64; PARTS] {
 
 /// Columns that are distinguished, with at least this information; the first group before the next, and in each group
 /// the best determined column first.
-fn distinguished(relative: &DMatrix<f64>, groups: &[Vec<usize>], least: f64) -> Vec<usize> {
+pub fn distinguished(relative: &DMatrix<f64>, groups: &[Vec<usize>], least: f64) -> Vec<usize> {
     let mut left = relative.clone();
     let mut identifiable = Vec::new();
     for group in groups {
@@ -255,13 +255,16 @@ fn distinguished(relative: &DMatrix<f64>, groups: &[Vec<usize>], least: f64) -> 
 }
 
 /// By how much each identifiable column stands for the others.
-struct Weights {
-    others: Vec<usize>,
+#[derive(Debug, Clone)]
+pub struct Weights {
+    pub others: Vec<usize>,
     /// In units of the magnitudes, one row per identifiable column and one column per other one.
-    of: DMatrix<f64>,
+    pub of: DMatrix<f64>,
 }
 
-fn weights(relative: &DMatrix<f64>, identifiable: &[usize]) -> Option<Weights> {
+/// The sums that identifiable columns stand for, by the information in units of the magnitudes; `None` if it is not
+/// positive definite.
+pub fn weights(relative: &DMatrix<f64>, identifiable: &[usize]) -> Option<Weights> {
     let others: Vec<usize> = (0..relative.nrows())
         .filter(|i| !identifiable.contains(i))
         .collect();

@@ -30,15 +30,16 @@ mod values;
 
 pub use crate::sim::{Window, cut, initial_state};
 pub use active_set::step_within_bounds;
-pub use combinations::{Combination, IdentifiableBodies, identifiable_bodies};
+pub use combinations::{
+    Combination, IdentifiableBodies, Weights, distinguished, identifiable_bodies, sizes, weights,
+};
 pub use distance::squared_distance;
 pub use fit::{as_it_stands, fit, fit_below, fit_by, led_below, predicted_cost};
 pub use identifiability::{Identifiability, Open, identifiability, open};
 pub(crate) use intervals::count;
 pub use intervals::{BLOCK_S, Uncertainty, blocks, blocks_of_times, uncertainty};
 pub use levenberg_marquardt::LevenbergMarquardt;
-pub(crate) use normal_equations::submatrix;
-pub use normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
+pub use normal_equations::{Reduced, WindowTerms, submatrix, with_unit_diagonal};
 pub use offsets::{CalibrateError, Offsets, calibrate, calibrate_first};
 pub use outcome::{Fit, FitError, Led, Termination};
 pub use search::{Linearised, Purpose, Search, Step};
