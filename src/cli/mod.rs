@@ -16,6 +16,7 @@ mod gains;
 mod import;
 mod inputs;
 mod interrupt;
+mod investigate;
 mod list;
 mod mbrl;
 mod merge;
@@ -71,6 +72,7 @@ enum Command {
     Tune(tune::Arguments),
     Sweep(sweep::Arguments),
     Evaluate(evaluate::Arguments),
+    Investigate(investigate::Arguments),
     Control(control::Arguments),
     Mbrl(mbrl::Arguments),
     Experiment(experiment::Arguments),
@@ -157,6 +159,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Tune(arguments) => tune::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Investigate(arguments) => investigate::run(&arguments),
         Command::Control(arguments) => control::run(&arguments),
         Command::Mbrl(arguments) => mbrl::run(&arguments),
         Command::Experiment(arguments) => experiment::run(&arguments),

@@ -1,0 +1,106 @@
+use residyn_core::closeloop::{Outcome, Verdict};
+use residyn_core::data::Joint;
+use residyn_core::model::FittedEffect;
+use serde::{Deserialize, Serialize};
+
+use super::choice::Purpose;
+
+/// One run and what closing the loop on all runs so far says: a line of `rounds.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Round {
+    /// Counted from 1; its log is `run-001.csv`, and so on.
+    pub run: usize,
+    /// What its motion was for.
+    pub purpose: Purpose,
+    /// Motion of all runs so far, s.
+    pub motion_s: f64,
+    pub verdict: Verdict,
+    /// Why, in a sentence.
+    pub reason: String,
+    /// Effects that are established.
+    pub established: Vec<Named>,
+    /// Effects that lower the error, without an established name.
+    pub supported: Vec<Named>,
+    /// Explanations that the runs do not tell from the established ones.
+    pub alternatives: Vec<Named>,
+    /// Root mean square of the open-loop error over half a second of this run, which the model of the runs before had not seen,
+    /// rad (or m); none for the first run.
+    pub unseen_rms: Option<f64>,
+    /// The same for the model of all runs so far.
+    pub rms: f64,
+}
+
+/// An effect by its name and joint.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Named {
+    pub name: String,
+    pub joint: Joint,
+}
+
+impl Named {
+    /// The name of an effect on its joint.
+    pub fn of(effect: &FittedEffect) -> Self {
+        Self {
+            name: effect.title(),
+            joint: effect.joint,
+        }
+    }
+}
+
+fn sorted(names: &[Named]) -> Vec<Named> {
+    let mut names = names.to_vec();
+    names.sort();
+    names
+}
+
+impl Round {
+    /// What an outcome says after a run.
+    pub(super) fn new(
+        run: usize,
+        purpose: Purpose,
+        motion_s: f64,
+        outcome: &Outcome,
+        [unseen_rms, rms]: [Option<f64>; 2],
+    ) -> Self {
+        let named = |findings: &[residyn_core::closeloop::Finding]| {
+            findings
+                .iter()
+                .map(|finding| Named::of(&finding.effect))
+                .collect()
+        };
+        let effects = &outcome.effects;
+        Self {
+            run,
+            purpose,
+            motion_s,
+            verdict: outcome.verdict,
+            reason: outcome.reason.clone(),
+            established: named(&effects.findings),
+            supported: named(&effects.supported),
+            alternatives: (effects.alternatives.iter())
+                .map(|alternative| Named::of(&alternative.effect))
+                .collect(),
+            unseen_rms,
+            rms: rms.unwrap_or(f64::NAN),
+        }
+    }
+
+    /// Whether nothing is open: everything that was found is established, nothing else would explain it as well, and nothing
+    /// significant is left.
+    pub fn is_settled(&self) -> bool {
+        let is_explained = matches!(self.verdict, Verdict::Explained | Verdict::NoMissingEffect);
+        is_explained && self.supported.is_empty() && self.alternatives.is_empty()
+    }
+
+    /// Whether it has the established names of another.
+    pub fn agrees(&self, other: &Self) -> bool {
+        sorted(&self.established) == sorted(&other.established)
+    }
+
+    /// Whether the same is established and open as in another.
+    pub fn says_as(&self, other: &Self) -> bool {
+        let open =
+            |round: &Self| sorted(&[round.supported.as_slice(), &round.alternatives].concat());
+        self.agrees(other) && open(self) == open(other)
+    }
+}
