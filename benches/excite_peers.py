@@ -30,6 +30,7 @@ def arguments():
     parser.add_argument("--pipeline", type=Path, help="a copy of robot-sysid-pipeline")
     parser.add_argument("--model", type=Path, default=ROOT / "configs/bench/arm-seven.toml")
     parser.add_argument("--torque", type=float, default=150.0, help="largest torque of joint 1 (N m); each further one has 62 % of it")
+    parser.add_argument("--iterations", type=int, default=300, help="most iterations of the pipeline's optimiser; its own default is 300")
     parser.add_argument("--out", type=Path, default=Path("excite-peers"))
     return parser.parse_args()
 
@@ -113,7 +114,7 @@ def of_pipeline(options, joints):
             "num_harmonics": 5,
             "base_frequency_hz": 1.0 / DURATION_S,
             "optimize_condition_number": True,
-            "optimizer_max_iter": 300,
+            "optimizer_max_iter": options.iterations,
             "trajectory_duration_periods": 1,
             "torque_constraint_method": "soft_penalty",
         },

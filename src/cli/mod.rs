@@ -7,7 +7,9 @@ mod check;
 mod closeloop;
 mod control;
 mod defect;
+mod effect_setting;
 mod evaluate;
+mod excite;
 mod experiment;
 mod export;
 mod fitting;
@@ -69,6 +71,7 @@ enum Command {
     Tune(tune::Arguments),
     Sweep(sweep::Arguments),
     Evaluate(evaluate::Arguments),
+    Excite(excite::Arguments),
     Control(control::Arguments),
     Mbrl(mbrl::Arguments),
     Experiment(experiment::Arguments),
@@ -155,6 +158,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Tune(arguments) => tune::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Excite(arguments) => excite::run(&arguments),
         Command::Control(arguments) => control::run(&arguments),
         Command::Mbrl(arguments) => mbrl::run(&arguments),
         Command::Experiment(arguments) => experiment::run(&arguments),

@@ -1,6 +1,7 @@
 //! The design of a motion: many random ones are improved side by side, and the best counts.
 
 use std::io::{self, Write};
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nalgebra::DMatrix;
@@ -239,6 +240,26 @@ impl<'a> Designer<'a> {
     pub fn random(&self, seed: u64) -> Result<Design, ExciteError> {
         let mut rng = stream(seed, Purpose::Other(0));
         self.outcome(&self.problem.random(&mut rng))
+    }
+
+    /// The best of the random motions of these seeds, by their torques.
+    ///
+    /// # Errors
+    /// As [`Designer::best`].
+    pub fn best_random(&self, seeds: Range<u64>) -> Result<Design, ExciteError> {
+        let problem = &self.problem;
+        let cost = |x: &[f64]| {
+            problem
+                .value(x, 0.0)
+                .map_or(f64::INFINITY, |(cost, _)| cost)
+        };
+        let all = seeds.into_par_iter().map(|seed| {
+            let x = problem.random(&mut stream(seed, Purpose::Other(0)));
+            (cost(&x), seed, x)
+        });
+        let best = all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let (_, _, x) = best.ok_or(ExciteError::NothingShown)?;
+        self.outcome(&x)
     }
 
     /// What a given motion tells by its torques: `[joint][row]` of position, speed and acceleration, one row each step of the
