@@ -15,9 +15,9 @@ use residyn_excite::{Design, ExciteError, Expected, Limits, Progress, Settings, 
 use residyn_io::files::{check_room, read_text, write_whole, write_with};
 use residyn_io::read_model;
 
-/// Evidence from which an alternative is told apart: twice the logarithm of a likelihood ratio of 100 to 1, plus what chance
-/// adds.
-const TOLD: f64 = 20.0;
+/// Evidence from which an alternative is told apart: the true model then leads by two standard errors with a probability of
+/// 95 % (docs/method.md, "Discriminate").
+const TOLD: f64 = 53.0;
 
 /// Design a motion within limits that tells a model's parameters, and its alternatives, apart best
 #[derive(Debug, Args)]

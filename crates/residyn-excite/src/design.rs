@@ -23,7 +23,7 @@ use crate::fourier::{Motion, Series};
 use crate::limits::Limits;
 use crate::motion;
 use crate::parameters::{Base, Sum};
-use crate::problem::Problem;
+use crate::problem::{NO_EVIDENCE, Problem};
 use crate::record::{Reference, record};
 
 /// How a motion is sought.
@@ -354,16 +354,27 @@ impl<'a> Designer<'a> {
     /// be told.
     fn left_open(&self, x: &[f64], criterion: Criterion) -> f64 {
         let cost = || -> Option<f64> {
-            let told = self.told(x).ok()?;
-            let base = self.problem.base.of(&told.0);
-            let least = told.1.iter().copied().fold(f64::INFINITY, f64::min);
-            let (cost, _) = criterion(&base)?;
-            Some(match told.1.is_empty() {
-                true => cost,
-                false => cost - least.max(f64::MIN_POSITIVE).ln(),
-            })
+            let (information, evidence) = self.told(x).ok()?;
+            let (cost, _) = criterion(&self.base_of(&information).of(&information))?;
+            let mut evidence = evidence.into_iter();
+            let Some(first) = evidence.next() else {
+                return Some(cost);
+            };
+            // A difference that is not a number stays one: such a motion ranks last.
+            let least = evidence.fold(first, |a, b| if b < a || b.is_nan() { b } else { a });
+            let cost = cost - (least + NO_EVIDENCE).ln();
+            (!cost.is_nan()).then_some(cost)
         };
         cost().unwrap_or(f64::INFINITY)
+    }
+
+    /// The sums that this information shows: those of torques, or fewer where angles alone show less.
+    fn base_of(&self, information: &DMatrix<f64>) -> Base {
+        let problem = &self.problem;
+        match log_determinant(&problem.base.of(information)) {
+            Some(_) => problem.base.clone(),
+            None => problem.parameters.base(information),
+        }
     }
 
     /// Information on the columns in units of their magnitudes, and the evidence for each alternative.
@@ -492,11 +503,7 @@ impl<'a> Designer<'a> {
         let problem = &self.problem;
         let (x, uses) = self.kept(x)?;
         let (information, evidence) = self.told(&x)?;
-        let base = match log_determinant(&problem.base.of(&information)) {
-            Some(_) => problem.base.clone(),
-            // The angles alone may show fewer sums than torques would.
-            None => problem.parameters.base(&information),
-        };
+        let base = self.base_of(&information);
         let own = base.of(&information);
         let (mean, _) = log_determinant(&own).ok_or(ExciteError::NothingShown)?;
         let grid = problem.series.even_grid(self.rows());

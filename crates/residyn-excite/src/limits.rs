@@ -174,7 +174,9 @@ impl Limits {
         let steps = (duration_s / self.step_s).round();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // a whole number within bounds
-        (LEAST_STEPS..=MOST_STEPS).contains(&steps).then_some(steps as usize + 1)
+        (LEAST_STEPS..=MOST_STEPS)
+            .contains(&steps)
+            .then_some(steps as usize + 1)
     }
 }
 

@@ -80,14 +80,9 @@ fn beside_others() {
 #[ignore = "minutes"]
 fn effort() {
     for (name, model, limits, duration_s) in rigs() {
-        for (harmonics, starts, steps) in [
-            (10, 8, 50),
-            (6, 8, 50),
-            (15, 8, 50),
-            (20, 8, 50),
-            (10, 32, 50),
-            (10, 8, 200),
-        ] {
+        for (harmonics, starts, steps) in
+            [(15, 12, 100), (25, 12, 100), (15, 48, 100), (15, 12, 400)]
+        {
             let settings = Settings {
                 harmonics,
                 starts,

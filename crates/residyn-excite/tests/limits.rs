@@ -242,3 +242,24 @@ fn designed_motions_tell_more_than_random_ones() {
         assert!(best.log_determinant > random.log_determinant);
     }
 }
+
+#[test]
+fn commands_of_a_drive_keep_their_range() {
+    let mut limits = limits(vec![joint([-1.2, 1.2], 2.0)]);
+    limits.joints[0].command = Some([-4.0, 4.0]);
+    limits.joints[0].command_rate = Some(40.0);
+    let model = model("motor");
+    let found = design(&model, &[], &limits, 6.0, &quick(), 1, &|_| ()).unwrap();
+    let volts = &found.command[0];
+    assert!(volts.iter().all(|volt| volt.abs() <= 4.0));
+    let steps = volts
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs() / found.step_s);
+    assert!(steps.fold(0.0, f64::max) <= 40.0);
+    let most = found.uses.iter().map(|one| one.share).fold(0.0, f64::max);
+    assert!((0.97..=1.0).contains(&most), "{:?}", found.uses);
+    // The simulated rig does what was designed.
+    let log = found.recorded_by(&model).unwrap();
+    let apart = log.q[0].iter().zip(&found.q[0]).map(|(a, b)| (a - b).abs());
+    assert!(apart.fold(0.0, f64::max) < 0.02);
+}
