@@ -40,7 +40,8 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// With more harmonics, starts or steps the criterion changed by less than a percent on arms of one to seven joints.
+    /// With four times the starts or steps, intervals of arms of two to twelve joints shrank by 3 % at most; with 25 harmonics
+    /// by 6 to 10 %, at higher frequencies than some rigs like.
     fn default() -> Self {
         Self {
             harmonics: 15,

@@ -11,7 +11,9 @@ use residyn_core::data::Joint;
 use residyn_core::model::Model;
 use residyn_core::model::tree::Pose;
 use residyn_core::rng;
-use residyn_excite::{Cuboid, Design, Designer, ExciteError, Limits, Settings, Sphere, design};
+use residyn_excite::{
+    Cuboid, Design, Designer, ExciteError, Limits, Settings, Sphere, design, picture,
+};
 use support::{arm_limits, chain, effect, joint, limits, model, with};
 
 /// Points between two rows.
@@ -188,6 +190,17 @@ fn rows_are_columns_of_a_log() {
     assert_eq!(lines.next(), Some("time,q1,q2,qd1,qd2,qdd1,qdd2,tau1,tau2"));
     assert_eq!(lines.count(), 201);
     serde_json::to_string(&found).unwrap();
+}
+
+#[test]
+fn the_figure_has_a_panel_for_each_joint() {
+    let (model, limits) = (model("acrobot"), arm_limits(2, 60.0));
+    let found = design(&model, &[], &limits, 2.0, &quick(), 1, &|_| ()).unwrap();
+    let figure = picture(&model, &limits, &found).unwrap();
+    assert!(figure.starts_with("<svg"), "{}", &figure[..40]);
+    for part in ["Joint 1", "Joint 2", "limits"] {
+        assert!(figure.contains(part), "{part}");
+    }
 }
 
 /// The height of a point of the last link.
