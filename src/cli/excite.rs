@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::effect_setting::{EffectSetting, add_effects};
 use super::{Answer, Common, inputs, progress, terminal};
 use residyn_core::data::Joint;
+use residyn_core::digits::amount_of;
 use residyn_core::model::{Library, Model};
 use residyn_core::plant::Plant;
 use residyn_excite::{Design, ExciteError, Expected, Limits, Progress, Settings, design, picture};
@@ -186,12 +187,10 @@ fn text(headline: &str, model: &Model, found: &Design, labels: &[String], time_s
     text
 }
 
-/// `m_2 + 0.5 mx_3`, `1.2 +- 0.01 kg`, `0.8 %`
-fn row(
-    Expected {
-        sum, half_width, ..
-    }: &Expected,
-) -> [String; 3] {
+/// `m_2 +0.5 mx_3`, `1.20 kg (1.19 to 1.21)`, `0.83 %`
+fn row(expected: &Expected) -> [String; 3] {
+    let (sum, half_width) = (&expected.sum, expected.half_width);
+    let ends = [sum.declared - half_width, sum.declared + half_width];
     let part = |(name, weight): &(String, f64)| match *weight == 1.0 {
         true => name.clone(),
         false => format!("{weight:+.3} {name}"),
@@ -199,7 +198,7 @@ fn row(
     let parts: Vec<String> = sum.parts.iter().map(part).collect();
     [
         parts.join(" "),
-        format!("{:.4} +- {half_width:.2} {}", sum.declared, sum.unit),
+        amount_of(sum.declared, Some(ends), &sum.unit),
         format!("{:.2} %", 100.0 * half_width / sum.size),
     ]
 }
