@@ -18,6 +18,7 @@ import tomllib
 from pathlib import Path
 
 import numpy
+import scipy.interpolate
 
 ROOT = Path(__file__).resolve().parents[1]
 STEP_S = 0.01
@@ -30,6 +31,7 @@ def arguments():
     parser.add_argument("--pipeline", type=Path, help="a copy of robot-sysid-pipeline")
     parser.add_argument("--model", type=Path, default=ROOT / "configs/bench/arm-seven.toml")
     parser.add_argument("--torque", type=float, default=150.0, help="largest torque of joint 1 (N m); each further one has 62 % of it")
+    parser.add_argument("--iterations", type=int, default=300, help="most iterations of the pipeline's optimiser; its own default is 300")
     parser.add_argument("--out", type=Path, default=Path("excite-peers"))
     return parser.parse_args()
 
@@ -113,7 +115,7 @@ def of_pipeline(options, joints):
             "num_harmonics": 5,
             "base_frequency_hz": 1.0 / DURATION_S,
             "optimize_condition_number": True,
-            "optimizer_max_iter": 300,
+            "optimizer_max_iter": options.iterations,
             "trajectory_duration_periods": 1,
             "torque_constraint_method": "soft_penalty",
         },
@@ -121,16 +123,27 @@ def of_pipeline(options, joints):
     }
     path = options.out / "pipeline.json"
     path.write_text(json.dumps(config))
+    written = options.out / "pipeline/pipeline/excitation_trajectory.npz"
+    written.unlink(missing_ok=True)
     start = time.monotonic()
-    log = (options.out / "pipeline.log").open("w")
-    subprocess.run([sys.executable, "sysid.py", str(path.resolve())], cwd=options.pipeline, check=True, stdout=log, stderr=log)
-    seconds = time.monotonic() - start
-    found = numpy.load(options.out / "pipeline/pipeline/excitation_trajectory.npz", allow_pickle=True)
+    with (options.out / "pipeline.log").open("w") as log:
+        run = subprocess.Popen([sys.executable, "sysid.py", str(path.resolve())], cwd=options.pipeline, stdout=log, stderr=log)
+        # After the motion it goes on to other results.
+        while run.poll() is None and not written.exists():
+            time.sleep(0.2)
+        seconds = time.monotonic() - start
+        time.sleep(2.0)
+        run.terminate()
+    found = numpy.load(written, allow_pickle=True)
     times = numpy.arange(round(DURATION_S / STEP_S) + 1) * STEP_S
-    own = found["t"]
-    # One period, at the rows of the limits.
-    q, qd, qdd = (numpy.column_stack([numpy.interp(times, own, c) for c in found[name].reshape(len(own), -1).T]) for name in ("q", "dq", "ddq"))
-    return (q, qd, qdd), seconds
+    # One period, from its few rows to those of the limits.
+    return [scipy.interpolate.CubicSpline(found["t"], rows(found, name), axis=0)(times) for name in ("q", "dq", "ddq")], seconds
+
+
+def rows(found, name):
+    """A channel with one row each time."""
+    channel = found[name]
+    return channel if channel.shape[0] == len(found["t"]) else channel.T
 
 
 def row(name, value, seconds):

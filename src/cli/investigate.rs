@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::call::{Begun, files};
 use super::elsewhere::Elsewhere;
+use super::excite::read_limits;
 use super::{Answer, Common, inputs, interrupt, terminal};
 use residyn_core::closeloop::Progress;
 use residyn_core::model::{Call, Model, Origin};
@@ -114,9 +115,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 
 /// The limits file, in the steps of the plant.
 fn limits(arguments: &Arguments, model: &Model, plant: &Controlled) -> Result<Limits> {
-    let path = &arguments.limits;
-    let text = read_text(path).with_context(|| path.display().to_string())?;
-    let mut limits = Limits::parse(&text, path, model)?;
+    let mut limits = read_limits(&arguments.limits, model)?;
     if let Some(description) = plant.description() {
         limits.step_s = description.step_s;
     }

@@ -7,8 +7,10 @@ mod check;
 mod closeloop;
 mod control;
 mod defect;
+mod effect_setting;
 mod elsewhere;
 mod evaluate;
+mod excite;
 mod experiment;
 mod export;
 mod fitting;
@@ -72,6 +74,7 @@ enum Command {
     Tune(tune::Arguments),
     Sweep(sweep::Arguments),
     Evaluate(evaluate::Arguments),
+    Excite(excite::Arguments),
     Investigate(investigate::Arguments),
     Control(control::Arguments),
     Mbrl(mbrl::Arguments),
@@ -159,6 +162,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Tune(arguments) => tune::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Excite(arguments) => excite::run(&arguments),
         Command::Investigate(arguments) => investigate::run(&arguments),
         Command::Control(arguments) => control::run(&arguments),
         Command::Mbrl(arguments) => mbrl::run(&arguments),

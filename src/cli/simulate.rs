@@ -1,14 +1,14 @@
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
 
+use super::effect_setting::{EffectSetting, add_effects};
 use super::elsewhere::Elsewhere;
 use super::record::record;
 use super::{Answer, Common, inputs, terminal};
-use residyn_core::data::{Joint, Log};
+use residyn_core::data::Log;
 use residyn_core::model::Library;
 use residyn_core::plant::Plant;
 use residyn_core::rng;
@@ -41,45 +41,6 @@ pub(super) struct Arguments {
     effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
-}
-
-/// `NAME[@JOINT][.PARAMETER]=VALUE`
-#[derive(Debug, Clone)]
-struct EffectSetting {
-    name: String,
-    joint: Joint,
-    parameter: Option<String>,
-    value: f64,
-}
-
-impl FromStr for EffectSetting {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let usage = "write NAME=VALUE, NAME@JOINT=VALUE or NAME.PARAMETER=VALUE";
-        let (target, value) = text.split_once('=').ok_or(usage)?;
-        let value = match value.parse::<f64>() {
-            Ok(number) if number.is_finite() => number,
-            _ => return Err(format!("{value:?} is not a number; {usage}")),
-        };
-        let (target, parameter) = match target.split_once('.') {
-            Some((target, parameter)) => (target, Some(parameter.to_owned())),
-            None => (target, None),
-        };
-        let (name, joint) = match target.split_once('@') {
-            Some((name, joint)) => {
-                let joint = joint.parse().map_err(|error| format!("{error}; {usage}"))?;
-                (name, joint)
-            }
-            None => (target, Joint::at(0)),
-        };
-        Ok(Self {
-            name: name.to_owned(),
-            joint,
-            parameter,
-            value,
-        })
-    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
@@ -126,28 +87,4 @@ fn simulated(
     write_log(&log, &arguments.out).context("the log was not written")?;
     let effects = plant.effects.iter().map(|e| e.effect.name.clone());
     Ok((log, effects.collect()))
-}
-
-/// Adds the effects, each with all settings for it on its joint.
-fn add_effects(plant: &mut Plant, library: &Library, settings: &[EffectSetting]) -> Result<()> {
-    type Group<'s> = (&'s str, Joint, Vec<(String, f64)>);
-    let mut groups: Vec<Group<'_>> = Vec::new();
-    for setting in settings {
-        let effect = library.effect(&setting.name)?;
-        let first = || effect.parameters.first().map(|first| first.name.clone());
-        let parameter = setting.parameter.clone().or_else(first);
-        let parameter = parameter.with_context(|| format!("{} has no parameter", setting.name))?;
-        let value = (parameter, setting.value);
-        match groups
-            .iter_mut()
-            .find(|(name, joint, _)| *name == setting.name && *joint == setting.joint)
-        {
-            Some((_, _, values)) => values.push(value),
-            None => groups.push((&setting.name, setting.joint, vec![value])),
-        }
-    }
-    for (name, joint, values) in groups {
-        plant.add_effect(library, name, joint, &values)?;
-    }
-    Ok(())
 }

@@ -19,7 +19,7 @@ pub enum ExciteError {
     )]
     NothingShown,
     #[error(
-        "a motion of {duration_s} s in steps of {step_s} s has too few or too many rows; choose a duration from 10 steps to ten million"
+        "a motion of {duration_s} s in steps of {step_s} s has too few or too many rows; choose a duration of 10 to 60000 steps"
     )]
     Duration { duration_s: f64, step_s: f64 },
     #[error(

@@ -7,12 +7,14 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use residyn_core::data::Joint;
-use residyn_core::limits::LOG_ROWS;
 use residyn_core::model::{FileError, Model};
 use residyn_core::toml_text::from_toml;
 
 /// Time between rows of a trajectory unless the file gives another one, s.
 const STEP_S: f64 = 0.01;
+/// Steps of a trajectory: ten minutes of a hundred rows a second are searched within the memory of a laptop.
+const LEAST_STEPS: f64 = 10.0;
+const MOST_STEPS: f64 = 60_000.0;
 /// Noise of a torque unless the file gives one, as a share of the joint's largest torque.
 const TORQUE_NOISE: f64 = 0.01;
 /// Noise of an encoder unless the file gives one, rad (or m): a turn in about 2^14 steps.
@@ -172,7 +174,9 @@ impl Limits {
         let steps = (duration_s / self.step_s).round();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // a whole number within bounds
-        (steps >= 10.0 && steps < LOG_ROWS as f64).then_some(steps as usize + 1)
+        (LEAST_STEPS..=MOST_STEPS)
+            .contains(&steps)
+            .then_some(steps as usize + 1)
     }
 }
 

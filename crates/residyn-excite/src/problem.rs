@@ -26,7 +26,7 @@ const STATES: usize = 400;
 /// Starts that are tried where the rig cannot rest in the middle.
 const TRIED: usize = 500;
 /// Evidence that counts as none.
-const NO_EVIDENCE: f64 = 1e-6;
+pub const NO_EVIDENCE: f64 = 1e-6;
 /// Singular values below this share of the largest one are rounding.
 const ROUNDING: f64 = 1e-10;
 /// Overlap of spheres that counts like the excess of a limit by all of it, m.

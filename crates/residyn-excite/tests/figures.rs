@@ -51,16 +51,13 @@ fn beside_others() {
         let random = |seed| designer.random(seed).unwrap();
         let mut motions: Vec<Design> = (0..50).map(random).collect();
         let start = Instant::now();
-        let mut best = random(50);
-        let mut tried = 1;
-        while start.elapsed().as_secs_f64() < time_s {
-            let other = random(50 + tried);
-            tried += 1;
-            if other.log_determinant > best.log_determinant {
-                best = other;
-            }
-        }
-        print(&format!("  best of {tried} random ones"), &best, time_s);
+        designer.best_random(0..100).unwrap();
+        let each_s = start.elapsed().as_secs_f64() / 100.0;
+        let tried = (time_s / each_s) as u64;
+        let start = Instant::now();
+        let best = designer.best_random(0..tried.max(1)).unwrap();
+        let random_s = start.elapsed().as_secs_f64();
+        print(&format!("  best of {tried} random ones"), &best, random_s);
         motions.sort_by(|a, b| a.relative_intervals().total_cmp(&b.relative_intervals()));
         print("  median of 50 random ones by intervals", &motions[25], 0.0);
         let five = Settings {
@@ -83,14 +80,9 @@ fn beside_others() {
 #[ignore = "minutes"]
 fn effort() {
     for (name, model, limits, duration_s) in rigs() {
-        for (harmonics, starts, steps) in [
-            (10, 8, 50),
-            (6, 8, 50),
-            (15, 8, 50),
-            (20, 8, 50),
-            (10, 32, 50),
-            (10, 8, 200),
-        ] {
+        for (harmonics, starts, steps) in
+            [(15, 12, 100), (25, 12, 100), (15, 48, 100), (15, 12, 400)]
+        {
             let settings = Settings {
                 harmonics,
                 starts,

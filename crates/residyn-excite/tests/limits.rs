@@ -11,7 +11,9 @@ use residyn_core::data::Joint;
 use residyn_core::model::Model;
 use residyn_core::model::tree::Pose;
 use residyn_core::rng;
-use residyn_excite::{Cuboid, Design, Designer, ExciteError, Limits, Settings, Sphere, design};
+use residyn_excite::{
+    Cuboid, Design, Designer, ExciteError, Limits, Settings, Sphere, design, picture,
+};
 use support::{arm_limits, chain, effect, joint, limits, model, with};
 
 /// Points between two rows.
@@ -190,6 +192,17 @@ fn rows_are_columns_of_a_log() {
     serde_json::to_string(&found).unwrap();
 }
 
+#[test]
+fn the_figure_has_a_panel_for_each_joint() {
+    let (model, limits) = (model("acrobot"), arm_limits(2, 60.0));
+    let found = design(&model, &[], &limits, 2.0, &quick(), 1, &|_| ()).unwrap();
+    let figure = picture(&model, &limits, &found).unwrap();
+    assert!(figure.starts_with("<svg"), "{}", &figure[..40]);
+    for part in ["Joint 1", "Joint 2", "limits"] {
+        assert!(figure.contains(part), "{part}");
+    }
+}
+
 /// The height of a point of the last link.
 fn tip_height(model: &Model, q: &[f64], tip: Vector3<f64>) -> f64 {
     let mechanism = model.mechanism(&model.values()).unwrap();
@@ -241,4 +254,25 @@ fn designed_motions_tell_more_than_random_ones() {
         let random = designer.random(seed).unwrap();
         assert!(best.log_determinant > random.log_determinant);
     }
+}
+
+#[test]
+fn commands_of_a_drive_keep_their_range() {
+    let mut limits = limits(vec![joint([-1.2, 1.2], 2.0)]);
+    limits.joints[0].command = Some([-4.0, 4.0]);
+    limits.joints[0].command_rate = Some(40.0);
+    let model = model("motor");
+    let found = design(&model, &[], &limits, 6.0, &quick(), 1, &|_| ()).unwrap();
+    let volts = &found.command[0];
+    assert!(volts.iter().all(|volt| volt.abs() <= 4.0));
+    let steps = volts
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs() / found.step_s);
+    assert!(steps.fold(0.0, f64::max) <= 40.0);
+    let most = found.uses.iter().map(|one| one.share).fold(0.0, f64::max);
+    assert!((0.97..=1.0).contains(&most), "{:?}", found.uses);
+    // The simulated rig does what was designed.
+    let log = found.recorded_by(&model).unwrap();
+    let apart = log.q[0].iter().zip(&found.q[0]).map(|(a, b)| (a - b).abs());
+    assert!(apart.fold(0.0, f64::max) < 0.02);
 }

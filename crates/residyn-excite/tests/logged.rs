@@ -136,3 +136,20 @@ fn a_joint_that_rests_leaves_its_sums_open() {
         found.next
     );
 }
+
+#[test]
+fn every_kind_of_rig_is_examined() {
+    for (name, torque) in [("pendulum", 8.0), ("servo", 1.8), ("motor", 2.0)] {
+        let model = support::model(name);
+        let limits = support::limits(vec![support::joint([-1.0, 1.0], torque)]);
+        let settings = Settings::default();
+        let designer = Designer::new(&model, &[], &limits, 8.0, &settings).unwrap();
+        let log = designer.random(3).unwrap().recorded_by(&model).unwrap();
+        let found = excitation(&model, &[log]).unwrap();
+        assert!(
+            found.sums >= 2 && found.open.is_empty(),
+            "{name}: {found:?}"
+        );
+        assert!(found.one_way.is_empty(), "{name}: {:?}", found.one_way);
+    }
+}
