@@ -23,6 +23,7 @@ mod dependencies;
 mod drives;
 mod edge_cases;
 mod effects;
+mod excite;
 mod export;
 mod flags;
 mod folders;

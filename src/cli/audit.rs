@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 
-use super::{Answer, Common, inputs, remedy, terminal};
+use super::{Answer, Common, excitation, inputs, remedy, terminal};
 use residyn_core::data::{Audit, Columns, Log, Severity, audit_together, report_repeats};
 use residyn_core::model::{Library, Model};
 use residyn_io::{
@@ -51,6 +51,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         for audit in &audits {
             let text = audit.message(&|remedy| format!("paste: {}", remedy::of_finding(remedy)));
             terminal::answer(headline(audit), &format!("{text}\n"))?;
+        }
+        if let Some(model) = model.as_ref().filter(|_| !terminal::is_quiet()) {
+            terminal::print(&excitation::text(model, &logs))?;
         }
     }
     let serious = audits.iter().any(|audit| audit.serious().next().is_some());

@@ -10,6 +10,7 @@ mod defect;
 mod effect_setting;
 mod elsewhere;
 mod evaluate;
+mod excitation;
 mod excite;
 mod experiment;
 mod export;

@@ -227,6 +227,52 @@ fn what_a_model_in_mujoco_hides_is_named_after_an_episode_and_planned_with() {
 }
 
 #[test]
+fn an_investigation_names_what_a_rig_hides_and_is_found_again() {
+    let scratch = Scratch::new();
+    let Some(environment) = plants_in(&scratch.path("")) else {
+        return;
+    };
+    for file in ["joint.xml", "joint-declared.xml", "joint-limits.toml"] {
+        fs::copy(ours("configs/elsewhere").join(file), scratch.path(file)).unwrap();
+    }
+    scratch.answers("new --from-mjcf joint-declared.xml --out joint.toml");
+    let run = || -> Value {
+        let line = "investigate --model joint.toml --limits joint-limits.toml --motion 64s --out x --json --seed 1 --plant";
+        let plant =
+            "exec:python -m residyn.plants.mujoco joint.xml --step 0.01 --position-noise 3e-4";
+        let mut command = scratch.command(line);
+        let output = command
+            .arg(plant)
+            .envs(environment.clone())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let found = run();
+    assert_eq!(found["ended"], "settled");
+    let rounds = found["rounds"].as_array().unwrap();
+    let named = &rounds[rounds.len() - 1]["established"];
+    assert_eq!(
+        named,
+        &serde_json::json!([{"name": "coulomb_friction", "joint": 1}])
+    );
+    assert!(scratch.has("x/report/model.toml") && scratch.has("x/report.html"));
+    // The same command finds what was done, and plays nothing.
+    let before = fs::metadata(scratch.path("x/run-001.csv"))
+        .unwrap()
+        .modified()
+        .unwrap();
+    assert_eq!(run(), found);
+    let after = fs::metadata(scratch.path("x/run-001.csv"))
+        .unwrap()
+        .modified()
+        .unwrap();
+    assert_eq!(before, after);
+}
+
+#[test]
 fn every_experiment_on_plants_in_other_processes_can_be_read() {
     let entries = fs::read_dir(ours("configs/elsewhere")).unwrap();
     let paths = entries.map(|entry| entry.unwrap().path());
@@ -238,6 +284,8 @@ fn every_experiment_on_plants_in_other_processes_can_be_read() {
                 drop(read_plant(&path, &Library::built_in()).unwrap());
             }
             Some((_, "task")) => drop(Task::read(&path).unwrap()),
+            // For a model that is made from a description; the guide uses it.
+            Some((_, "limits")) => {}
             _ => drop(undeclared_effect::Experiment::read(&path).unwrap()),
         }
     }

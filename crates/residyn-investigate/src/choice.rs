@@ -4,7 +4,7 @@ use residyn_core::model::{FittedEffect, Library, Model};
 use residyn_excite::{Design, Designer, ExciteError, Limits, Settings, design};
 use serde::{Deserialize, Serialize};
 
-use super::round::Named;
+use super::round::{Named, open_alternatives};
 
 /// How much slower a slow motion is: dry friction shows in it, and so does what a fast one hides behind inertia.
 const SLOWER: f64 = 4.0;
@@ -170,7 +170,7 @@ impl Known<'_> {
             return Vec::new();
         };
         let model = outcome.models.after.model.absorbed();
-        let others = outcome.effects.alternatives.iter().map(|alternative| {
+        let others = open_alternatives(outcome).map(|alternative| {
             let rival = outcome
                 .models
                 .after

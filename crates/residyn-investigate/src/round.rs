@@ -1,4 +1,4 @@
-use residyn_core::closeloop::{Outcome, Verdict};
+use residyn_core::closeloop::{Alternative, Outcome, Verdict};
 use residyn_core::data::Joint;
 use residyn_core::model::FittedEffect;
 use serde::{Deserialize, Serialize};
@@ -47,6 +47,16 @@ impl Named {
     }
 }
 
+/// The other explanations, without those that hold an established effect as a special case and explain no more than it.
+pub(super) fn open_alternatives(outcome: &Outcome) -> impl Iterator<Item = &Alternative> {
+    let effects = &outcome.effects;
+    let holds_another = |alternative: &Alternative| {
+        let mut found = effects.findings.iter();
+        found.any(|finding| alternative.effect.contains(&finding.effect))
+    };
+    (effects.alternatives.iter()).filter(move |alternative| !holds_another(alternative))
+}
+
 fn sorted(names: &[Named]) -> Vec<Named> {
     let mut names = names.to_vec();
     names.sort();
@@ -77,7 +87,7 @@ impl Round {
             reason: outcome.reason.clone(),
             established: named(&effects.findings),
             supported: named(&effects.supported),
-            alternatives: (effects.alternatives.iter())
+            alternatives: (open_alternatives(outcome))
                 .map(|alternative| Named::of(&alternative.effect))
                 .collect(),
             unseen_rms,

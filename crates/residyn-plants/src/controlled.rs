@@ -9,7 +9,7 @@ use super::error::RemoteError;
 use super::fleet::Fleet;
 use super::remote::Lateness;
 use residyn_control::control::{DriveError, Driven, Simulated, Task};
-use residyn_core::data::Joint;
+use residyn_core::data::{Joint, Quantity};
 use residyn_core::model::{Dynamics, Library, Model};
 use residyn_core::plant::{Plant, PlantError};
 use residyn_io::files::beside_or_named;
@@ -127,6 +127,14 @@ impl Controlled {
         match self {
             Self::Simulated(simulation) => simulation.plant.system.joints,
             Self::Elsewhere(fleet) => fleet.description().joints.len(),
+        }
+    }
+
+    /// What drives it.
+    pub fn driven_by(&self) -> Quantity {
+        match self {
+            Self::Simulated(simulation) => simulation.plant.system.driven_by(),
+            Self::Elsewhere(fleet) => fleet.description().command.quantity(),
         }
     }
 

@@ -1,15 +1,10 @@
-//! Figures for docs/excite.md: `cargo test --release -p residyn-excite --test figures -- --ignored --nocapture`.
-
-// In tests a panic is the message.
-#![allow(clippy::unwrap_used)]
-
-mod support;
+//! Figures for docs/excite.md: `cargo test --release -p residyn-excite --test excite figures -- --ignored --nocapture`.
 
 use std::time::Instant;
 
+use crate::support::{arm_limits, chain, joint, limits, model};
 use residyn_core::model::Model;
 use residyn_excite::{Design, Designer, Limits, Settings, design, log_condition};
-use support::{arm_limits, chain, joint, limits, model};
 
 fn rigs() -> Vec<(&'static str, Model, Limits, f64)> {
     vec![

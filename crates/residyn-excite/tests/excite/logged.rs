@@ -1,14 +1,9 @@
 //! What logs cannot tell is found.
 
-// In tests a panic is the message.
-#![allow(clippy::unwrap_used)]
-
-mod support;
-
+use crate::support::{arm_limits, chain, effect, with};
 use residyn_core::data::{Joint, Log};
 use residyn_core::model::Model;
 use residyn_excite::{Designer, Settings, excitation};
-use support::{arm_limits, chain, effect, with};
 
 fn arm() -> Model {
     let model = chain(4);
@@ -140,8 +135,8 @@ fn a_joint_that_rests_leaves_its_sums_open() {
 #[test]
 fn every_kind_of_rig_is_examined() {
     for (name, torque) in [("pendulum", 8.0), ("servo", 1.8), ("motor", 2.0)] {
-        let model = support::model(name);
-        let limits = support::limits(vec![support::joint([-1.0, 1.0], torque)]);
+        let model = crate::support::model(name);
+        let limits = crate::support::limits(vec![crate::support::joint([-1.0, 1.0], torque)]);
         let settings = Settings::default();
         let designer = Designer::new(&model, &[], &limits, 8.0, &settings).unwrap();
         let log = designer.random(3).unwrap().recorded_by(&model).unwrap();

@@ -1,17 +1,12 @@
 //! Expected intervals and evidence are those of fits to simulated logs with noise.
 
-// In tests a panic is the message.
-#![allow(clippy::unwrap_used)]
-
-mod support;
-
+use crate::support::{arm_limits, effect, joint, limits, model, with};
 use rand_distr::{Distribution, Normal};
 use residyn_core::data::Log;
 use residyn_core::identify::{LevenbergMarquardt, Shooting, cut, fit, fit_torques};
 use residyn_core::model::Model;
 use residyn_core::rng;
 use residyn_excite::{Compared, Design, Limits, Settings, design};
-use support::{arm_limits, effect, joint, limits, model, with};
 
 const SEEDS: u64 = 20;
 

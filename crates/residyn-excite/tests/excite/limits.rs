@@ -1,10 +1,6 @@
 //! Designed motions keep every limit, at their rows and between them.
 
-// In tests a panic is the message.
-#![allow(clippy::unwrap_used)]
-
-mod support;
-
+use crate::support::{arm_limits, chain, effect, joint, limits, model, with};
 use nalgebra::Vector3;
 use rand::RngExt;
 use residyn_core::data::Joint;
@@ -14,7 +10,6 @@ use residyn_core::rng;
 use residyn_excite::{
     Cuboid, Design, Designer, ExciteError, Limits, Settings, Sphere, design, picture,
 };
-use support::{arm_limits, chain, effect, joint, limits, model, with};
 
 /// Points between two rows.
 const BETWEEN: usize = 7;
