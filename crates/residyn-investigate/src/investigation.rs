@@ -5,7 +5,7 @@ use residyn_core::sim::metric::assess;
 use residyn_core::streams::{Purpose as Draws, stream};
 use residyn_excite::Limits;
 use residyn_io::runs::RunFolder;
-use residyn_plants::{Commanded, Controlled, plant_seed};
+use residyn_plants::{Controlled, plant_seed};
 use serde::{Deserialize, Serialize};
 
 use super::choice::{Choice, Choose, Known};
@@ -94,7 +94,7 @@ impl Investigation<'_> {
         watch: &dyn Watch,
     ) -> Result<Investigated, InvestigateError> {
         self.check()?;
-        let mut kept = Kept::open(folder, self.model.joints)?;
+        let mut kept = Kept::open(folder, self.plant)?;
         for round in &kept.rounds {
             watch.ended(round);
         }
@@ -152,8 +152,8 @@ impl Investigation<'_> {
                 joints: plant.joints(),
             });
         }
-        let taken = plant.description().map(|plant| plant.command.quantity());
-        if let Some(taken) = taken.filter(|taken| *taken != model.driven_by()) {
+        let taken = plant.driven_by();
+        if taken != model.driven_by() {
             return Err(InvestigateError::Driven {
                 model: model.name.clone(),
                 found: words(model.driven_by()),
@@ -186,12 +186,9 @@ impl Investigation<'_> {
     fn play(&self, choice: &Choice, run: usize, kept: &Kept) -> Result<Log, InvestigateError> {
         let design = &choice.design;
         let start: Vec<f64> = design.q.iter().map(|q| q[0]).collect();
-        let is_position = (self.plant.description())
-            .is_some_and(|plant| plant.command == Commanded::Position)
-            || self.model.driven_by() == Quantity::Command;
-        let tracking = match is_position {
-            true => Tracking::none(self.model.joints),
-            false => Tracking::of(&self.model.dynamics(), &start)?,
+        let tracking = match self.plant.driven_by() {
+            Quantity::Command => Tracking::none(self.model.joints),
+            _ => Tracking::of(&self.model.dynamics(), &start)?,
         };
         let speeds = self
             .limits

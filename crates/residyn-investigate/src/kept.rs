@@ -2,7 +2,8 @@ use std::path::PathBuf;
 
 use residyn_core::data::{Columns, Log};
 use residyn_io::runs::RunFolder;
-use residyn_io::{WriteLogError, read_rig_log, write_log};
+use residyn_io::{read_rig_log, write_log};
+use residyn_plants::Controlled;
 
 use super::error::InvestigateError;
 use super::round::Round;
@@ -13,16 +14,18 @@ const ROUNDS: &str = "rounds.jsonl";
 /// investigation that is resumed goes on after the last line.
 pub struct Kept {
     folder: RunFolder,
+    joints: usize,
+    columns: Columns,
     pub rounds: Vec<Round>,
     pub logs: Vec<Log>,
 }
 
 impl Kept {
-    /// Read what is in `folder`, of a rig with so many joints.
+    /// Read what is in `folder`, of this plant.
     ///
     /// # Errors
     /// A damaged file.
-    pub fn open(folder: &RunFolder, joints: usize) -> Result<Self, InvestigateError> {
+    pub fn open(folder: &RunFolder, plant: &Controlled) -> Result<Self, InvestigateError> {
         folder.make()?;
         let text = folder.text(ROUNDS)?.unwrap_or_default();
         let read = |(number, line): (usize, &str)| {
@@ -32,14 +35,20 @@ impl Kept {
         let rounds = (text.lines().enumerate().map(read)).collect::<Result<Vec<Round>, _>>()?;
         let mut kept = Self {
             folder: folder.clone(),
+            joints: plant.joints(),
+            columns: Columns::standard(plant.joints(), plant.driven_by()),
             logs: Vec::new(),
             rounds,
         };
         for run in 1..=kept.rounds.len() {
-            let log = read_rig_log(kept.log(run), joints, &Columns::default())?;
+            let log = kept.read(run)?;
             kept.logs.push(log);
         }
         Ok(kept)
+    }
+
+    fn read(&self, run: usize) -> Result<Log, InvestigateError> {
+        Ok(read_rig_log(self.log(run), self.joints, &self.columns)?)
     }
 
     /// The log of a run, counted from 1.
@@ -52,11 +61,9 @@ impl Kept {
     /// # Errors
     /// A file that cannot be written.
     pub fn keep_log(&mut self, log: &Log) -> Result<(), InvestigateError> {
-        let path = self.log(self.logs.len() + 1);
-        let failed = |error: WriteLogError| InvestigateError::Kept(error);
-        write_log(log, &path).map_err(failed)?;
-        self.logs
-            .push(read_rig_log(&path, log.joints(), &Columns::default())?);
+        let run = self.logs.len() + 1;
+        write_log(log, self.log(run))?;
+        self.logs.push(self.read(run)?);
         Ok(())
     }
 

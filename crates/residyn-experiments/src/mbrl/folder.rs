@@ -70,8 +70,9 @@ impl Folder {
             self.write_stretch(&state.logs[0], 0)?;
             return Ok(state);
         }
-        let columns = Columns::default();
-        let read = |number| read_rig_log(self.stretch(number), run.task.joints(), &columns);
+        let joints = run.plant.joints();
+        let columns = Columns::standard(joints, run.plant.driven_by());
+        let read = |number| read_rig_log(self.stretch(number), joints, &columns);
         let device = run.learner.backend.device();
         let checkpoint = Checkpoint::load(&self.checkpoint())?;
         Ok(RunState {
