@@ -1,0 +1,266 @@
+//! The healthy state: by how much the model is off already, and how far scores scatter while nothing changes.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use super::block::{Block, Columns, JointSums, Sums};
+use super::hypothesis::Hypothesis;
+
+/// Probes count as one where all but this share of one is the other.
+const SAME_PROBE: f64 = 1e-6;
+/// What is added to information of unit diagonal so that it can be inverted; far below what noise leaves of it.
+const RIDGE: f64 = 1e-9;
+/// Correlation of neighbouring blocks beyond which blocks are too short to say how far their sums scatter.
+const MOST_CORRELATED: f64 = 0.8;
+/// A residual that is this small a share of the torques is rounding.
+const ROUNDING: f64 = 1e-20;
+/// The misfit that the probes may have before any data, in standard deviations of the residual.
+const PROBE_PRIOR: f64 = 10.0;
+
+/// Where the machine stands, and how far the scores of blocks scatter about zero there.
+#[derive(Debug, Clone)]
+pub(crate) struct Baseline {
+    /// 1 / variance of each joint's residual; zero for a joint that does not move.
+    pub weights: Vec<f64>,
+    /// The values of all columns by which the machine differs from its model.
+    pub offset: DVector<f64>,
+    /// Their covariance, for scores that scatter as white residuals would.
+    pub covariance: DMatrix<f64>,
+    pub hypotheses: Vec<Scatter>,
+    /// `None` for a joint without weight.
+    pub probes: Vec<Option<ProbeScatter>>,
+}
+
+/// How far a hypothesis' scores scatter.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scatter {
+    /// Variance of a window's score per information in it; 1 for white residuals.
+    pub variance: f64,
+    /// Independent blocks that it is known from, less one.
+    pub freedom: f64,
+}
+
+/// How far the scores of a joint's probes scatter.
+#[derive(Debug, Clone)]
+pub(crate) struct ProbeScatter {
+    /// From the probes to combinations of unit information in a healthy block.
+    pub to_independent: DMatrix<f64>,
+    /// Covariance of these in a window, per share of the healthy blocks' information in it.
+    pub covariance: DMatrix<f64>,
+    /// Each probe's information in a healthy block.
+    pub information: DVector<f64>,
+    /// Independent blocks that it is known from.
+    pub blocks: f64,
+}
+
+impl Baseline {
+    /// From healthy blocks. `None` if no joint moves.
+    pub fn of(blocks: &[Block], columns: &Columns, hypotheses: &[Hypothesis]) -> Option<Self> {
+        let weight = |joint: usize| weight(blocks.iter().map(|block| &block.joints[joint]));
+        let weights: Vec<f64> = (0..columns.of_joint.len()).map(weight).collect();
+        if weights.iter().all(|weight| *weight == 0.0) {
+            return None;
+        }
+        let each: Vec<Sums> = blocks.iter().map(|block| Sums::of(block, columns, &weights)).collect();
+        let mut total = each[0].clone();
+        each[1..].iter().for_each(|sums| total.add(sums));
+        let samples = |joint: usize| -> usize { blocks.iter().map(|block| block.joints[joint].samples).sum() };
+        let priors: Vec<f64> = (0..columns.count())
+            .map(|column| match hypotheses.get(column) {
+                Some(hypothesis) => hypothesis.prior.powi(2),
+                None => {
+                    let joint = (column - columns.hypotheses) / super::block::PROBES;
+                    let information = total.information[(column, column)];
+                    match information > 0.0 {
+                        true => PROBE_PRIOR.powi(2) * samples(joint) as f64 / information,
+                        false => 1.0,
+                    }
+                }
+            })
+            .collect();
+        // How far scores scatter decides what the priors weigh, and the offsets decide how far scores scatter.
+        let mut found = Self::with_priors(&each, &total, &weights, columns, |column| 1.0 / priors[column]);
+        for _ in 0..2 {
+            let scatter = found.hypotheses.clone();
+            let weighs = |column: usize| scatter.get(column).map_or(1.0, |own| own.variance) / priors[column];
+            found = Self::with_priors(&each, &total, &weights, columns, weighs);
+        }
+        Some(found)
+    }
+
+    fn with_priors(
+        each: &[Sums],
+        total: &Sums,
+        weights: &[f64],
+        columns: &Columns,
+        precision: impl Fn(usize) -> f64,
+    ) -> Self {
+        let mut information = total.information.clone();
+        for column in 0..columns.count() {
+            information[(column, column)] += precision(column);
+        }
+        let covariance = inverted(&information);
+        let offset = &covariance * &total.score;
+        let left: Vec<DVector<f64>> = each.iter().map(|sums| &sums.score - &sums.information * &offset).collect();
+        let scatter = |column: usize| {
+            let own = each.iter().zip(&left);
+            let own: Vec<[f64; 2]> = own.map(|(sums, left)| [left[column], sums.information[(column, column)]]).collect();
+            scatter(&own)
+        };
+        let probes = |joint: usize| (weights[joint] > 0.0).then(|| probes(each, &left, columns.probes(joint)));
+        Self {
+            weights: weights.to_vec(),
+            hypotheses: (0..columns.hypotheses).map(scatter).collect(),
+            probes: (0..weights.len()).map(|joint| probes(joint).flatten()).collect(),
+            offset,
+            covariance,
+        }
+    }
+
+    /// The sums of a block, with what the machine differs by already taken off its scores.
+    pub fn beyond(&self, block: &Block, columns: &Columns) -> Sums {
+        let mut sums = Sums::of(block, columns, &self.weights);
+        sums.score -= &sums.information * &self.offset;
+        sums
+    }
+
+    /// Takes a change of some columns into the baseline: they may have any value now, and a window tells which.
+    pub fn absorb(&mut self, changed: &[usize], window: &Sums) {
+        for column in changed {
+            let information = window.information[(*column, *column)];
+            if information > 0.0 {
+                // A million times what the window leaves open.
+                self.covariance[(*column, *column)] += 1e6 / information;
+            }
+        }
+        // (C^-1 + A)^-1 = C - C A (1 + C A)^-1 C
+        let through = &self.covariance * &window.information;
+        let count = through.nrows();
+        let Some(gain) = (DMatrix::identity(count, count) + &through).lu().solve(&self.covariance) else {
+            return;
+        };
+        self.covariance = 0.5 * (&gain + gain.transpose());
+        self.offset += &self.covariance * &window.score;
+    }
+}
+
+/// 1 / variance of a joint's residual about its own regression; zero if the joint does not move.
+fn weight<'b>(blocks: impl Iterator<Item = &'b JointSums>) -> f64 {
+    let mut blocks = blocks;
+    let Some(mut total) = blocks.next().cloned() else { return 0.0 };
+    for own in blocks {
+        total.samples += own.samples;
+        total.score += &own.score;
+        total.information += &own.information;
+        total.square += own.square;
+    }
+    let columns = total.score.len();
+    if total.samples <= 2 * columns {
+        return 0.0;
+    }
+    let values = inverted(&total.information) * &total.score;
+    let left = (total.square - values.dot(&total.score)).max(ROUNDING * total.square);
+    match left > 0.0 {
+        true => (total.samples - columns) as f64 / left,
+        false => 0.0,
+    }
+}
+
+/// The inverse of an information matrix, whose columns may have any scale. A column without information stays without.
+fn inverted(information: &DMatrix<f64>) -> DMatrix<f64> {
+    let scale = information.diagonal().map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
+    let count = scale.len();
+    let mut scaled = DMatrix::from_fn(count, count, |i, k| information[(i, k)] * scale[i] * scale[k]);
+    for k in 0..count {
+        scaled[(k, k)] = 1.0 + RIDGE;
+    }
+    let inverse = match scaled.clone().cholesky() {
+        Some(cholesky) => cholesky.inverse(),
+        // Rounding: the nearest matrix that can be inverted.
+        None => {
+            let SymmetricEigen { eigenvalues, eigenvectors } = scaled.symmetric_eigen();
+            let inverse = DMatrix::from_diagonal(&eigenvalues.map(|value| 1.0 / value.max(RIDGE)));
+            &eigenvectors * inverse * eigenvectors.transpose()
+        }
+    };
+    DMatrix::from_fn(count, count, |i, k| inverse[(i, k)] * scale[i] * scale[k])
+}
+
+/// Of `[score, information]` block by block.
+fn scatter(blocks: &[[f64; 2]]) -> Scatter {
+    let count = blocks.len() as f64;
+    let information: f64 = blocks.iter().map(|[_, information]| information).sum();
+    if !(information > 0.0) {
+        return Scatter { variance: 0.0, freedom: 1.0 };
+    }
+    let square: f64 = blocks.iter().map(|[score, _]| score * score).sum();
+    let scaled = blocks.iter().map(|[score, information]| match *information > 0.0 {
+        true => score / information.sqrt(),
+        false => 0.0,
+    });
+    let longer = lasting(&scaled.collect::<Vec<f64>>());
+    Scatter {
+        // Two values, those of offset and scatter, come from the same blocks.
+        variance: longer * square / information * count / (count - 2.0),
+        freedom: ((count - 2.0) / longer).max(3.0),
+    }
+}
+
+/// By what factor the variance of a long sum exceeds that of as many independent draws, if neighbours are correlated as these
+/// are and others by the powers of it (first-order autoregression).
+fn lasting(draws: &[f64]) -> f64 {
+    let square: f64 = draws.iter().map(|draw| draw * draw).sum();
+    let product: f64 = draws.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    let correlation = (product / square).clamp(0.0, MOST_CORRELATED);
+    match square > 0.0 {
+        true => (1.0 + correlation) / (1.0 - correlation),
+        false => 1.0,
+    }
+}
+
+/// `None` if none of the probes is excited.
+fn probes(
+    each: &[Sums],
+    left: &[DVector<f64>],
+    places: std::ops::Range<usize>,
+) -> Option<ProbeScatter> {
+    let (first, count) = (places.start, places.len());
+    let blocks = each.len() as f64;
+    let square = |sums: &Sums| sums.information.view((first, first), (count, count)).into_owned();
+    let mean = each.iter().map(square).fold(DMatrix::zeros(count, count), |sum, own| sum + own) / blocks;
+    let information = mean.diagonal();
+    let scale = information.map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
+    let scaled = DMatrix::from_fn(count, count, |i, k| mean[(i, k)] * scale[i] * scale[k]);
+    let SymmetricEigen { eigenvalues, eigenvectors } = scaled.symmetric_eigen();
+    let kept: Vec<usize> = (0..count).filter(|k| eigenvalues[*k] > SAME_PROBE * count as f64).collect();
+    if kept.is_empty() {
+        return None;
+    }
+    let to_independent = DMatrix::from_fn(kept.len(), count, |i, k| {
+        eigenvectors[(k, kept[i])] * scale[k] / eigenvalues[kept[i]].sqrt()
+    });
+    let draws: Vec<DVector<f64>> = each
+        .iter()
+        .zip(left)
+        .map(|(sums, left)| {
+            let share = share(&sums.information, &information, first);
+            let draw = &to_independent * left.rows(first, count);
+            if share > 0.0 { draw / share.sqrt() } else { draw * 0.0 }
+        })
+        .collect();
+    let covariance = draws.iter().fold(DMatrix::zeros(kept.len(), kept.len()), |sum, draw| sum + draw * draw.transpose());
+    let of_row = |row: usize| lasting(&draws.iter().map(|draw| draw[row]).collect::<Vec<f64>>());
+    let longer = (0..kept.len()).map(of_row).sum::<f64>() / kept.len() as f64;
+    Some(ProbeScatter {
+        to_independent,
+        covariance: covariance * (longer / (blocks - 2.0)),
+        information,
+        blocks: ((blocks - 2.0) / longer).max(kept.len() as f64 + 3.0),
+    })
+}
+
+/// The information of a window about probes, in healthy blocks.
+pub(crate) fn share(window: &DMatrix<f64>, healthy: &DVector<f64>, first: usize) -> f64 {
+    let excited = (0..healthy.len()).filter(|k| healthy[*k] > 0.0);
+    let shares: Vec<f64> = excited.map(|k| window[(first + k, first + k)] / healthy[k]).collect();
+    shares.iter().sum::<f64>() / shares.len().max(1) as f64
+}

@@ -1,0 +1,184 @@
+//! Sums of residuals and regressors over a block of time, one joint at a time.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::equations::Equations;
+use super::grid::Sample;
+use super::judgement::Verdict;
+
+/// Smooth functions of a joint's angle, speed and direction, which stand for whatever the model lacks there.
+pub(crate) const PROBES: usize = 6;
+
+/// Which columns the residual of each joint depends on: hypotheses first, then the probes of each joint.
+#[derive(Debug, Clone)]
+pub(crate) struct Columns {
+    pub hypotheses: usize,
+    pub of_joint: Vec<Vec<usize>>,
+}
+
+impl Columns {
+    pub fn new(hypotheses: usize, columns_of: &[Vec<usize>]) -> Self {
+        let with_probes = |(joint, own): (usize, &Vec<usize>)| {
+            let first = hypotheses + joint * PROBES;
+            own.iter().copied().chain(first..first + PROBES).collect()
+        };
+        Self {
+            hypotheses,
+            of_joint: columns_of.iter().enumerate().map(with_probes).collect(),
+        }
+    }
+
+    pub fn count(&self) -> usize {
+        self.hypotheses + self.of_joint.len() * PROBES
+    }
+
+    /// The columns that may have any value after a change: what changed, and the probes of the joints that it acts on, since
+    /// no regressor is exact.
+    pub fn free_with(&self, verdict: &Verdict) -> Vec<usize> {
+        let acts_on = |joint: &usize| match verdict {
+            Verdict::Named(of) => of.first().is_some_and(|h| self.of_joint[*joint].contains(h)),
+            Verdict::Unexplained(own) => own == joint,
+        };
+        let joints = (0..self.of_joint.len()).filter(acts_on);
+        let probes = joints.flat_map(|joint| self.probes(joint));
+        match verdict {
+            Verdict::Named(of) => of.iter().take(1).copied().chain(probes).collect(),
+            Verdict::Unexplained(_) => probes.collect(),
+        }
+    }
+
+    pub fn probes(&self, joint: usize) -> std::ops::Range<usize> {
+        let first = self.hypotheses + joint * PROBES;
+        first..first + PROBES
+    }
+}
+
+/// Sums of one joint: the products of its columns with the residual, among each other, and the residual's square.
+#[derive(Debug, Clone)]
+pub(crate) struct JointSums {
+    pub samples: usize,
+    pub score: DVector<f64>,
+    pub information: DMatrix<f64>,
+    pub square: f64,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Block {
+    pub start_s: f64,
+    pub end_s: f64,
+    pub joints: Vec<JointSums>,
+}
+
+/// What the probes and the sums need to know of the joints.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Usual {
+    /// Angles from which the probes count.
+    pub origins: Vec<f64>,
+    /// Speeds below which a joint with dry friction may rest; zero for the others. At rest, dry friction takes any torque, and
+    /// smoothing does not tell when a joint began to move: windows in which it was that slow do not count for it.
+    pub resting: Vec<f64>,
+}
+
+impl Block {
+    /// The sums over samples, of which there is at least one.
+    pub fn of(
+        samples: &[Sample],
+        equations: &mut Equations,
+        columns: &Columns,
+        usual: &Usual,
+    ) -> Self {
+        let zeros = |own: &Vec<usize>| JointSums {
+            samples: 0,
+            score: DVector::zeros(own.len()),
+            information: DMatrix::zeros(own.len(), own.len()),
+            square: 0.0,
+        };
+        let mut joints: Vec<JointSums> = columns.of_joint.iter().map(zeros).collect();
+        let mut x = Vec::new();
+        equations.over(samples, |at, joint, residual, regressors| {
+            let sample = &samples[at];
+            if sample.slowest[joint] < usual.resting[joint] {
+                return;
+            }
+            x.clear();
+            x.extend_from_slice(regressors);
+            let angle = sample.q[joint] - usual.origins[joint];
+            let speed = sample.qd[joint];
+            let direction = sample.directions[joint];
+            x.extend([1.0, angle, angle * angle, speed, direction, angle * speed]);
+            joints[joint].add(residual, &x);
+        });
+        joints.iter_mut().for_each(JointSums::mirror);
+        Self {
+            start_s: samples[0].time,
+            end_s: samples[samples.len() - 1].time,
+            joints,
+        }
+    }
+
+    /// Whether all sums are finite.
+    pub fn is_finite(&self) -> bool {
+        let mut joints = self.joints.iter();
+        joints.all(|own| own.square.is_finite() && own.information.iter().all(|x| x.is_finite()))
+    }
+}
+
+impl JointSums {
+    fn add(&mut self, residual: f64, x: &[f64]) {
+        self.samples += 1;
+        self.square += residual * residual;
+        for (column, value) in x.iter().enumerate() {
+            self.score[column] += value * residual;
+            // The lower triangle, which lies together in memory.
+            let below = &mut self.information.column_mut(column);
+            for (row, other) in x.iter().enumerate().skip(column) {
+                below[row] += value * other;
+            }
+        }
+    }
+
+    fn mirror(&mut self) {
+        self.information.fill_upper_triangle_with_lower_triangle();
+    }
+}
+
+/// Scores and information of all columns over some blocks, with joints weighted by their noise.
+#[derive(Debug, Clone)]
+pub(crate) struct Sums {
+    pub start_s: f64,
+    pub end_s: f64,
+    pub blocks: usize,
+    pub score: DVector<f64>,
+    pub information: DMatrix<f64>,
+}
+
+impl Sums {
+    pub fn of(block: &Block, columns: &Columns, weights: &[f64]) -> Self {
+        let count = columns.count();
+        let mut sums = Self {
+            start_s: block.start_s,
+            end_s: block.end_s,
+            blocks: 1,
+            score: DVector::zeros(count),
+            information: DMatrix::zeros(count, count),
+        };
+        for ((own, places), weight) in block.joints.iter().zip(&columns.of_joint).zip(weights) {
+            for (i, row) in places.iter().enumerate() {
+                sums.score[*row] += weight * own.score[i];
+                for (k, column) in places.iter().enumerate() {
+                    sums.information[(*row, *column)] += weight * own.information[(i, k)];
+                }
+            }
+        }
+        sums
+    }
+
+    /// Adds those of an earlier or a later stretch.
+    pub fn add(&mut self, other: &Self) {
+        self.start_s = self.start_s.min(other.start_s);
+        self.end_s = self.end_s.max(other.end_s);
+        self.blocks += other.blocks;
+        self.score += &other.score;
+        self.information += &other.information;
+    }
+}
