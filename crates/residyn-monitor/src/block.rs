@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::equations::Equations;
 use super::grid::Sample;
+use super::averages::Averages;
 use super::judgement::Verdict;
 
 /// Smooth functions of a joint's angle, speed and direction, which stand for whatever the model lacks there.
@@ -85,28 +86,26 @@ impl Block {
         samples: &[Sample],
         equations: &mut Equations,
         columns: &Columns,
-        usual: &Usual,
+        (usual, averages): (&Usual, &mut Averages),
     ) -> Self {
-        let zeros = |own: &Vec<usize>| JointSums {
-            samples: 0,
-            score: DVector::zeros(own.len()),
-            information: DMatrix::zeros(own.len(), own.len()),
-            square: 0.0,
-        };
-        let mut joints: Vec<JointSums> = columns.of_joint.iter().map(zeros).collect();
-        let mut x = Vec::new();
+        let mut joints: Vec<JointSums> = columns.of_joint.iter().map(|own| JointSums::new(own.len())).collect();
+        let mut row = Vec::new();
         equations.over(samples, |at, joint, residual, regressors| {
             let sample = &samples[at];
-            if sample.slowest[joint] < usual.resting[joint] {
-                return;
-            }
-            x.clear();
-            x.extend_from_slice(regressors);
             let angle = sample.q[joint] - usual.origins[joint];
             let speed = sample.qd[joint];
             let direction = sample.directions[joint];
-            x.extend([1.0, angle, angle * angle, speed, direction, angle * speed]);
-            joints[joint].add(residual, &x);
+            row.clear();
+            row.push(residual);
+            row.extend_from_slice(regressors);
+            row.extend([1.0, angle, angle * angle, speed, direction, angle * speed]);
+            // A direction of motion, or none.
+            let along = if speed.abs() < usual.resting[joint] { 0.0 } else { speed.signum() };
+            let along = if usual.resting[joint] > 0.0 { along } else { 1.0 };
+            let mean = averages.of_joint[joint].push(&row, along, sample.is_first);
+            if let Some([residual, x @ ..]) = mean {
+                joints[joint].add(*residual, x);
+            }
         });
         joints.iter_mut().for_each(JointSums::mirror);
         Self {
@@ -124,6 +123,15 @@ impl Block {
 }
 
 impl JointSums {
+    fn new(columns: usize) -> Self {
+        Self {
+            samples: 0,
+            score: DVector::zeros(columns),
+            information: DMatrix::zeros(columns, columns),
+            square: 0.0,
+        }
+    }
+
     fn add(&mut self, residual: f64, x: &[f64]) {
         self.samples += 1;
         self.square += residual * residual;

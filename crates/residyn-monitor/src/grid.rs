@@ -31,10 +31,10 @@ pub(crate) struct Sample {
     pub qdd: Vec<f64>,
     pub driven: Vec<f64>,
     pub measured: Vec<f64>,
-    /// The signs of the velocities, smoothed like the torques.
+    /// The signs of the velocities.
     pub directions: Vec<f64>,
-    /// The lowest speeds within the window; zero if the joint reverses there.
-    pub slowest: Vec<f64>,
+    /// Whether it is the first one after a gap.
+    pub is_first: bool,
 }
 
 /// What was not used as it came.
@@ -59,11 +59,10 @@ pub(crate) struct Grid {
     since: Vec<Row>,
     /// Even rows that are still needed.
     even: Vec<Row>,
-    /// The velocities at each even row, as far as they are known.
-    velocities: Vec<Vec<f64>>,
     next_time: f64,
     /// Even rows until the next sample.
     until_sample: usize,
+    is_first: bool,
     /// Largest second difference of each angle in the healthy stretch.
     bends: Vec<f64>,
     last: Vec<Vec<f64>>,
@@ -80,8 +79,8 @@ impl Grid {
         widths: Vec<f64>,
     ) -> Self {
         Self {
-            // Twice within a half width: the window passes nothing that needs more.
-            stride: (kernel.half / 2).max(1),
+            // More than twice within a half width: the window passes nothing that needs more.
+            stride: (2 * kernel.half / 5).max(1),
             bends: vec![0.0; widths.len()],
             kernel,
             delayed,
@@ -90,9 +89,9 @@ impl Grid {
             widths,
             since: Vec::new(),
             even: Vec::new(),
-            velocities: Vec::new(),
             next_time: 0.0,
             until_sample: 0,
+            is_first: true,
             last: Vec::new(),
             is_healthy: true,
             irregular: Irregular::default(),
@@ -128,7 +127,7 @@ impl Grid {
     fn restart(&mut self, row: Row) {
         self.next_time = row.time;
         self.even.clear();
-        self.velocities.clear();
+        self.is_first = true;
         self.last = vec![row.q.clone()];
         self.until_sample = 0;
         self.since = vec![row];
@@ -198,27 +197,15 @@ impl Grid {
     /// What the newest even row completes.
     fn observe(&mut self, samples: &mut Vec<Sample>) {
         let half = self.kernel.half;
-        let Some(middle) = self.even.len().checked_sub(half + 1) else {
-            return;
-        };
-        let velocity = |joint: usize| match middle >= half {
-            true => self.smoothed(&self.kernel.slope, middle, joint),
-            false => 0.0,
-        };
-        let velocities = (0..self.widths.len()).map(velocity).collect();
-        self.velocities.push(velocities);
-        let reach = self.delayed.iter().map(|own| own.past).max().unwrap_or(half);
-        let Some(centre) = middle.checked_sub(half + 1) else {
-            return;
-        };
-        // The velocity at the first row of the window needs a half width before it.
-        if centre < reach.max(2 * half) {
-            return;
-        }
+        let reach = self.delayed.iter().map(|own| own.past).fold(half, usize::max);
+        // A held torque that is a mean over the step before its row is centred one row later.
+        let centre = self.even.len().checked_sub(half + 2).filter(|centre| *centre >= reach);
+        let Some(centre) = centre else { return };
         if self.until_sample == 0 {
             samples.push(self.sample(centre));
+            self.is_first = false;
             self.until_sample = self.stride;
-            self.forget(centre - reach.max(2 * half));
+            self.forget(centre - reach);
         }
         self.until_sample -= 1;
     }
@@ -229,7 +216,6 @@ impl Grid {
     }
 
     fn sample(&self, centre: usize) -> Sample {
-        let Kernel { half, value, slope, curvature, .. } = &self.kernel;
         let joints = 0..self.widths.len();
         let of_angles = |weights: &[f64]| -> Vec<f64> {
             (joints.clone()).map(|joint| self.smoothed(weights, centre, joint)).collect()
@@ -238,26 +224,18 @@ impl Grid {
             let rows = self.even[centre - own.past..].iter();
             own.weights.iter().zip(rows).map(|(w, row)| w * row.driven[joint]).sum()
         });
-        let within = &self.velocities[centre - half..=centre + half];
-        let directions = self.widths.iter().enumerate().map(|(joint, width)| {
-            let width = width.max(f64::MIN_POSITIVE);
-            let rows = value.iter().zip(within);
-            rows.map(|(w, row)| w * (row[joint] / width).tanh()).sum()
-        });
-        let slowest = joints.clone().map(|joint| {
-            let along = within[0][joint].signum();
-            let speeds = within.iter().map(|row| (row[joint] * along).max(0.0));
-            speeds.fold(f64::INFINITY, f64::min)
-        });
+        let qd = of_angles(&self.kernel.slope);
+        let directions = qd.iter().zip(&self.widths);
+        let directions = directions.map(|(qd, width)| (qd / width.max(f64::MIN_POSITIVE)).tanh());
         Sample {
             time: self.even[centre].time,
-            q: of_angles(value),
-            qd: of_angles(slope),
-            qdd: of_angles(curvature),
+            q: of_angles(&self.kernel.value),
+            qdd: of_angles(&self.kernel.curvature),
             driven: driven.collect(),
             measured: self.even[centre].measured.clone(),
             directions: directions.collect(),
-            slowest: slowest.collect(),
+            is_first: self.is_first,
+            qd,
         }
     }
 
@@ -266,7 +244,6 @@ impl Grid {
         // Seldom, so that moving the others costs nothing.
         if rows > 1024 {
             self.even.drain(..rows);
-            self.velocities.drain(..rows);
         }
     }
 }

@@ -2,6 +2,7 @@
 //! model, and since when. docs/monitor.md has the method.
 
 mod alarm;
+mod averages;
 mod baseline;
 mod block;
 mod equations;

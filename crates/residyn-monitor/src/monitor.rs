@@ -2,6 +2,7 @@ use residyn_core::data::TorqueColumn;
 use residyn_core::data::statistics::median;
 use residyn_core::model::{CommandFilter, Dynamics, Model};
 
+use super::averages::Averages;
 use super::baseline::Baseline;
 use super::block::{Block, Columns, Sums, Usual};
 use super::equations::{Equations, compile};
@@ -17,9 +18,12 @@ use super::{
 
 /// Rows from which step and noise are taken before anything else.
 const FIRST_ROWS: usize = 256;
-/// Half the width of the smoothing, s, and in steps of slower logs: it passes 5 Hz, which is more than most arms move at.
-const SMOOTHING_S: f64 = 0.04;
-const SMOOTHING_STEPS: f64 = 5.0;
+/// Half the width of the window over which motion and torques are smoothed before the equations are evaluated, s, and in
+/// steps of slower logs: what it takes from forces that are not linear in the motion grows with its square.
+const LIGHT_S: f64 = 0.04;
+const LIGHT_STEPS: f64 = 5.0;
+/// Half the width of the window over which residuals are averaged then, in that of the first.
+const WIDE: f64 = 3.0;
 /// A joint with dry friction rests below this many standard deviations of its velocity's noise, or widths of the reversal.
 const RESTING_DEVIATIONS: f64 = 3.0;
 const RESTING_WIDTHS: f64 = 2.0;
@@ -48,8 +52,9 @@ pub struct Monitor {
     grid: Option<Grid>,
     samples: Vec<Sample>,
     usual: Usual,
+    averages: Averages,
     healthy: Vec<Block>,
-    watch: Option<Watch>,
+    pub(crate) watch: Option<Watch>,
 }
 
 /// What the smoothing needs to know of the model.
@@ -61,8 +66,8 @@ struct Watched {
 }
 
 /// The state after the healthy stretch.
-struct Watch {
-    baseline: Baseline,
+pub(crate) struct Watch {
+    pub(crate) baseline: Baseline,
     thresholds: Thresholds,
     history: History,
     /// All blocks since then, as one: how much the motion shows.
@@ -132,6 +137,7 @@ impl Monitor {
             grid: None,
             samples: Vec::new(),
             usual: Usual::default(),
+            averages: Averages { of_joint: Vec::new() },
             healthy: Vec::new(),
             watch: None,
         })
@@ -182,8 +188,9 @@ impl Monitor {
     fn begin(&mut self, rows: &[Row]) -> Grid {
         let steps: Vec<f64> = rows.windows(2).map(|pair| pair[1].time - pair[0].time).collect();
         let step_s = median(&steps);
-        let usual = (SMOOTHING_STEPS * step_s).max(SMOOTHING_S);
-        let kernel = Kernel::new(self.settings.smoothing_s.unwrap_or(usual), step_s);
+        let usual = WIDE * (LIGHT_STEPS * step_s).max(LIGHT_S);
+        let wide_s = self.settings.smoothing_s.unwrap_or(usual);
+        let kernel = Kernel::new(wide_s / WIDE, step_s);
         let Watched { dynamics, torque, widths, dry } = &self.compiled;
         let angle = |joint: usize| rows.iter().map(move |row| row.q[joint]);
         let resting = |joint: usize| {
@@ -213,7 +220,10 @@ impl Monitor {
             kernel.delayed(delay_s, own(CommandFilter::Lag))
         });
         let delayed = delayed.collect();
-        Grid::new(kernel, delayed, *torque, step_s, widths.clone())
+        let grid = Grid::new(kernel, delayed, *torque, step_s, widths.clone());
+        let widths = self.columns.of_joint.iter().map(|own| 1 + own.len());
+        self.averages = Averages::new(wide_s, grid.sample_step_s(), widths);
+        grid
     }
 
     /// The blocks that the newest samples complete.
@@ -224,7 +234,7 @@ impl Monitor {
         while self.samples.len() >= wanted {
             let rest = self.samples.split_off(wanted);
             let samples = std::mem::replace(&mut self.samples, rest);
-            let block = Block::of(&samples, &mut self.equations, &self.columns, &self.usual);
+            let block = Block::of(&samples, &mut self.equations, &self.columns, (&self.usual, &mut self.averages));
             if !block.is_finite() {
                 return Err(MonitorError::Healthy {
                     time: block.end_s,

@@ -10,8 +10,8 @@ pub struct Settings {
     pub healthy_s: f64,
     /// Length of the blocks whose scores are taken as one draw, s: several times the width of the smoothing.
     pub block_s: f64,
-    /// Half the width of the window over which motion and torques are smoothed alike, s; `None` for 80 ms, or eight steps of
-    /// slower logs.
+    /// Half the width of the window over which forces are averaged, s; `None` for 120 ms, or fifteen steps of slower logs. A
+    /// joint with dry friction is watched while it moves one way for twice that long.
     pub smoothing_s: Option<f64>,
     /// Where a load at the tip is expected in the frame of the last body, m; `None` for that body's centre of mass.
     pub payload_at: Option<[f64; 3]>,

@@ -6,7 +6,7 @@ use residyn_core::model::tree::{Drivetrain, Inertia, Pose, Servo, Tree, model_te
 use residyn_core::model::{Library, Model};
 use residyn_core::plant::{Excitation, Plant};
 use residyn_core::rng;
-use residyn_monitor::Rows;
+use crate::Rows;
 
 /// Rows per second.
 pub const RATE_HZ: f64 = 100.0;

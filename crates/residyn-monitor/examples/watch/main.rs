@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use machines::{RATE_HZ, adding, arm, joint, model, piece, servo_arm, with_effect};
 use residyn_core::plant::Plant;
-use residyn_monitor::{Monitor, Settings};
+use residyn_monitor::{Monitor, Rows, Settings};
 
 /// Length of a piece of a simulated log, s, and the pause before the next.
 const PIECE_S: f64 = 300.0;
