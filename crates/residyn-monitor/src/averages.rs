@@ -23,6 +23,15 @@ pub(crate) struct Average {
     mean: Vec<f64>,
 }
 
+/// What a row adds.
+pub(crate) enum Averaged<'a> {
+    /// Nothing yet.
+    Nothing,
+    /// The joint did not move one way all along.
+    Interrupted,
+    Mean(&'a [f64]),
+}
+
 impl Averages {
     /// Over a half width of time, of rows that are a step apart (s); `widths` are the numbers in a row of each joint.
     pub fn new(half_width_s: f64, step_s: f64, widths: impl Iterator<Item = usize>) -> Self {
@@ -43,8 +52,8 @@ impl Averages {
 }
 
 impl Average {
-    /// One more row; its mean with those before it, if there is one now and the joint moved one way all along.
-    pub fn push(&mut self, row: &[f64], along: f64, is_first: bool) -> Option<&[f64]> {
+    /// One more row; its mean with those before it, if there is one now.
+    pub fn push(&mut self, row: &[f64], along: f64, is_first: bool) -> Averaged<'_> {
         if is_first {
             self.rows.clear();
             self.along.clear();
@@ -52,10 +61,12 @@ impl Average {
         }
         self.rows.extend_from_slice(row);
         self.along.push(along);
-        let first = self.along.len().checked_sub(self.weights.len())?;
+        let Some(first) = self.along.len().checked_sub(self.weights.len()) else {
+            return if is_first { Averaged::Interrupted } else { Averaged::Nothing };
+        };
         if self.until_mean > 0 {
             self.until_mean -= 1;
-            return None;
+            return Averaged::Nothing;
         }
         self.until_mean = self.stride - 1;
         let way = self.along[first];
@@ -74,6 +85,9 @@ impl Average {
             self.rows.drain(..first * self.width);
             self.along.drain(..first);
         }
-        moves.then_some(&self.mean)
+        match moves {
+            true => Averaged::Mean(&self.mean),
+            false => Averaged::Interrupted,
+        }
     }
 }

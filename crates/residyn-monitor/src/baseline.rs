@@ -7,6 +7,8 @@ use super::hypothesis::Hypothesis;
 
 /// Probes count as one where all but this share of one is the other.
 const SAME_PROBE: f64 = 1e-6;
+/// A combination of probes of which a block shows this small a share of what the mean block does is not shown by it.
+const LEAST_SHOWN: f64 = 1e-3;
 /// What is added to information of unit diagonal so that it can be inverted; far below what noise leaves of it.
 const RIDGE: f64 = 1e-9;
 /// Correlation of neighbouring blocks beyond which blocks are too short to say how far their sums scatter.
@@ -44,10 +46,8 @@ pub(crate) struct Scatter {
 pub(crate) struct ProbeScatter {
     /// From the probes to combinations of unit information in a healthy block.
     pub to_independent: DMatrix<f64>,
-    /// Covariance of these in a window, per share of the healthy blocks' information in it.
-    pub covariance: DMatrix<f64>,
-    /// Each probe's information in a healthy block.
-    pub information: DVector<f64>,
+    /// Root of the covariance of these in a healthy block.
+    pub root: DMatrix<f64>,
     /// Independent blocks that it is known from.
     pub blocks: f64,
 }
@@ -238,29 +238,28 @@ fn probes(
     let to_independent = DMatrix::from_fn(kept.len(), count, |i, k| {
         eigenvectors[(k, kept[i])] * scale[k] / eigenvalues[kept[i]].sqrt()
     });
-    let draws: Vec<DVector<f64>> = each
-        .iter()
-        .zip(left)
-        .map(|(sums, left)| {
-            let share = share(&sums.information, &information, first);
-            let draw = &to_independent * left.rows(first, count);
-            if share > 0.0 { draw / share.sqrt() } else { draw * 0.0 }
-        })
-        .collect();
+    // As they would be if each block had the information of the mean.
+    let draw = |(sums, left): (&Sums, &DVector<f64>)| -> DVector<f64> {
+        let own = &to_independent * square(sums) * to_independent.transpose();
+        let SymmetricEigen { eigenvalues, eigenvectors } = own.symmetric_eigen();
+        let inverse = eigenvalues.map(|value| if value > LEAST_SHOWN { value.sqrt().recip() } else { 0.0 });
+        let draw = eigenvectors.transpose() * (&to_independent * left.rows(first, count));
+        &eigenvectors * draw.component_mul(&inverse)
+    };
+    let draws: Vec<DVector<f64>> = each.iter().zip(left).map(draw).collect();
     let covariance = draws.iter().fold(DMatrix::zeros(kept.len(), kept.len()), |sum, draw| sum + draw * draw.transpose());
     let of_row = |row: usize| lasting(&draws.iter().map(|draw| draw[row]).collect::<Vec<f64>>());
     let longer = (0..kept.len()).map(of_row).sum::<f64>() / kept.len() as f64;
     Some(ProbeScatter {
         to_independent,
-        covariance: covariance * (longer / (blocks - 2.0)),
-        information,
+        root: root(&(covariance * (longer / (blocks - 2.0)))),
         blocks: ((blocks - 2.0) / longer).max(kept.len() as f64 + 3.0),
     })
 }
 
-/// The information of a window about probes, in healthy blocks.
-pub(crate) fn share(window: &DMatrix<f64>, healthy: &DVector<f64>, first: usize) -> f64 {
-    let excited = (0..healthy.len()).filter(|k| healthy[*k] > 0.0);
-    let shares: Vec<f64> = excited.map(|k| window[(first + k, first + k)] / healthy[k]).collect();
-    shares.iter().sum::<f64>() / shares.len().max(1) as f64
+/// The symmetric root of a covariance.
+pub(crate) fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let SymmetricEigen { eigenvalues, eigenvectors } = covariance.clone().symmetric_eigen();
+    let roots = DMatrix::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
+    &eigenvectors * roots * eigenvectors.transpose()
 }

@@ -4,11 +4,14 @@ use nalgebra::{DMatrix, DVector};
 
 use super::equations::Equations;
 use super::grid::Sample;
-use super::averages::Averages;
+use super::averages::{Averaged, Averages};
 use super::judgement::Verdict;
 
 /// Smooth functions of a joint's angle, speed and direction, which stand for whatever the model lacks there.
 pub(crate) const PROBES: usize = 6;
+
+/// Means in a run of which the ends make up half of the noise: windows overlap by a quarter, and reach two over.
+const CANCELLING: f64 = 8.0;
 
 /// Which columns the residual of each joint depends on: hypotheses first, then the probes of each joint.
 #[derive(Debug, Clone)]
@@ -88,7 +91,9 @@ impl Block {
         columns: &Columns,
         (usual, averages): (&Usual, &mut Averages),
     ) -> Self {
-        let mut joints: Vec<JointSums> = columns.of_joint.iter().map(|own| JointSums::new(own.len())).collect();
+        let empty = || columns.of_joint.iter().map(|own| JointSums::new(own.len()));
+        let mut joints: Vec<JointSums> = empty().collect();
+        let mut runs: Vec<JointSums> = empty().collect();
         let mut row = Vec::new();
         equations.over(samples, |at, joint, residual, regressors| {
             let sample = &samples[at];
@@ -102,12 +107,16 @@ impl Block {
             // A direction of motion, or none.
             let along = if speed.abs() < usual.resting[joint] { 0.0 } else { speed.signum() };
             let along = if usual.resting[joint] > 0.0 { along } else { 1.0 };
-            let mean = averages.of_joint[joint].push(&row, along, sample.is_first);
-            if let Some([residual, x @ ..]) = mean {
-                joints[joint].add(*residual, x);
+            match averages.of_joint[joint].push(&row, along, sample.is_first) {
+                Averaged::Mean([residual, x @ ..]) => runs[joint].add(*residual, x),
+                Averaged::Interrupted => joints[joint].take(&mut runs[joint]),
+                _ => {}
             }
         });
-        joints.iter_mut().for_each(JointSums::mirror);
+        for (own, run) in joints.iter_mut().zip(&mut runs) {
+            own.take(run);
+            own.mirror();
+        }
         Self {
             start_s: samples[0].time,
             end_s: samples[samples.len() - 1].time,
@@ -143,6 +152,20 @@ impl JointSums {
                 below[row] += value * other;
             }
         }
+    }
+
+    /// Adds a run of means without interruption, and empties it. The noise of accelerations cancels between overlapping
+    /// windows, but at the ends of a run: a long run is worth more than its share.
+    fn take(&mut self, run: &mut Self) {
+        if run.samples == 0 {
+            return;
+        }
+        let weight = run.samples as f64 / (run.samples as f64 + CANCELLING);
+        self.samples += run.samples;
+        self.score.axpy(weight, &run.score, 1.0);
+        self.information += &run.information * weight;
+        self.square += weight * run.square;
+        *run = Self::new(run.score.len());
     }
 
     fn mirror(&mut self) {

@@ -1,8 +1,8 @@
 //! What the latest windows say: whether something has changed, and what explains it.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::baseline::{Baseline, share};
+use super::baseline::Baseline;
 use super::block::{Columns, Sums};
 use super::history::History;
 use super::hypothesis::Hypothesis;
@@ -12,7 +12,9 @@ use super::{Settings, tails};
 /// cases, or
 const LEFT_BY_CHANCE: f64 = 0.003;
 /// if it is this small a share of the whole: regressors of a model are not exact.
-const LEFT_BY_MODEL: f64 = 0.1;
+const LEFT_BY_MODEL: f64 = 0.03;
+/// Combinations of probes with this share of the largest variance are not shown by a window.
+const LEAST_SHOWN: f64 = 1e-4;
 /// Two explanations whose likelihoods differ by less than a factor of 100 explain alike: twice its logarithm.
 const ALIKE: f64 = 9.2;
 
@@ -61,7 +63,7 @@ impl Thresholds {
         });
         let of_probes = |p: f64| -> Vec<f64> {
             let each = baseline.probes.iter().map(|own| match own {
-                Some(own) => tails::hotelling(p, own.covariance.nrows(), own.blocks),
+                Some(own) => tails::hotelling(p, own.root.nrows(), own.blocks),
                 None => f64::INFINITY,
             });
             each.collect()
@@ -168,12 +170,10 @@ impl Judge<'_> {
         };
         let places = self.columns.probes(joint);
         let (first, count) = (places.start, places.len());
-        let share = share(&window.information, &own.information, first);
-        if !(share > 0.0) {
-            return 0.0;
-        }
         let score = &own.to_independent * score.rows(first, count);
-        let scatter = &own.covariance * share;
+        let information = window.information.view((first, first), (count, count));
+        let information = &own.to_independent * information * own.to_independent.transpose();
+        let scatter = &own.root * information * &own.root;
         let floor = squared_length(&scatter, &score);
         if floor < 0.1 * threshold {
             return floor;
@@ -181,8 +181,7 @@ impl Judge<'_> {
         let rows = window.information.columns(first, count);
         let of_baseline = rows.transpose() * &self.baseline.covariance * rows;
         let of_baseline = &own.to_independent * of_baseline * own.to_independent.transpose();
-        let usual = own.covariance.trace() / own.covariance.nrows() as f64;
-        squared_length(&(scatter + of_baseline * usual), &score)
+        squared_length(&(scatter + &own.root * of_baseline * &own.root), &score)
     }
 
     /// What explains a window.
@@ -201,9 +200,15 @@ impl Judge<'_> {
         let mut ranked: Vec<usize> = (0..self.hypotheses.len())
             .filter(|h| evidence.hypotheses[*h] > 0.0 && is_admissible(*h, self.change(window, *h)[0]))
             .collect();
-        ranked.sort_by(|a, b| evidence.hypotheses[*b].total_cmp(&evidence.hypotheses[*a]));
-        let best = ranked.first().map_or(0.0, |h| evidence.hypotheses[*h]);
-        ranked.retain(|h| evidence.hypotheses[*h] > best - ALIKE && evidence.hypotheses[*h] > 0.5 * best);
+        // The residual that each takes away, on one scale for all: their own scatters would favour some.
+        let gain = |h: usize| window.score[h].powi(2) / window.information[(h, h)];
+        ranked.sort_by(|a, b| gain(*b).total_cmp(&gain(*a)));
+        let best = ranked.first().copied();
+        let least = best.map_or(0.0, |best| {
+            let scatter = gain(best) / evidence.hypotheses[best];
+            (gain(best) - ALIKE * scatter).max(0.5 * gain(best))
+        });
+        ranked.retain(|h| gain(*h) >= least);
         ranked.retain(|h| explains(*h));
         let has_crossed = |h: &usize| evidence.hypotheses[*h] >= 0.5 * self.thresholds.hypotheses[*h];
         if ranked.iter().any(has_crossed) {
@@ -219,10 +224,11 @@ impl Judge<'_> {
 /// A standard normal variable is below it nine times in ten.
 const NINE_IN_TEN: f64 = 1.2816;
 
-/// `v' C^-1 v`; infinite if the covariance cannot be inverted.
+/// `v' C^-1 v`, over the directions that a window shows at all.
 fn squared_length(covariance: &DMatrix<f64>, vector: &DVector<f64>) -> f64 {
-    match covariance.clone().cholesky() {
-        Some(cholesky) => vector.dot(&cholesky.solve(vector)),
-        None => 0.0,
-    }
+    let SymmetricEigen { eigenvalues, eigenvectors } = covariance.clone().symmetric_eigen();
+    let least = LEAST_SHOWN * eigenvalues.max();
+    let parts = eigenvectors.transpose() * vector;
+    let parts = parts.iter().zip(&eigenvalues).filter(|(_, value)| **value > least);
+    parts.map(|(part, value)| part * part / value).sum()
 }

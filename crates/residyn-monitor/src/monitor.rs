@@ -28,7 +28,7 @@ const WIDE: f64 = 3.0;
 const RESTING_DEVIATIONS: f64 = 3.0;
 const RESTING_WIDTHS: f64 = 2.0;
 /// Blocks that an alarm waits for what explains it, at least and at most: as long as the change was there before it was seen.
-const WAIT_BLOCKS: [usize; 2] = [5, 30];
+const WAIT_BLOCKS: [usize; 2] = [8, 30];
 /// Blocks after an alarm from which the new state is learnt before the watch goes on.
 const SETTLING_BLOCKS: usize = 30;
 /// What was told is told again when it has grown by this share.
@@ -80,6 +80,7 @@ pub(crate) struct Watch {
     unexplained: Vec<Option<f64>>,
     alarms: Vec<Alarm>,
     followed: usize,
+    disturbances: usize,
 }
 
 /// An alarm that waits for its explanation.
@@ -277,6 +278,7 @@ impl Monitor {
             unexplained: vec![None; self.expected.joints],
             alarms: Vec::new(),
             followed: 0,
+            disturbances: 0,
             baseline,
         });
         Ok(())
@@ -318,6 +320,11 @@ impl Monitor {
             return None;
         }
         watch.pending = None;
+        if evidence.ratio < 1.0 {
+            // It is over: a push, a touch.
+            watch.disturbances += 1;
+            return None;
+        }
         let is_admissible = |h: usize, change: f64| {
             let [low, high] = hypotheses[h].bounds;
             let whole = changed(h) + change;
@@ -360,6 +367,7 @@ impl Monitor {
             repeated_rows: irregular.repeated,
             alarms: watch.map_or_else(Vec::new, |watch| watch.alarms.clone()),
             followed: watch.map_or(0, |watch| watch.followed),
+            disturbances: watch.map_or(0, |watch| watch.disturbances),
             limits: watch.map_or_else(Vec::new, |watch| self.limits(watch)),
         }
     }

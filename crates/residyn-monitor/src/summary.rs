@@ -38,6 +38,8 @@ pub struct Summary {
     /// Alarms that were told, and changes of what was told before that were followed without another word.
     pub alarms: Vec<Alarm>,
     pub followed: usize,
+    /// Changes that were over before they could be explained.
+    pub disturbances: usize,
     pub limits: Vec<DetectionLimit>,
 }
 
@@ -50,6 +52,9 @@ impl fmt::Display for Summary {
         }
         if gaps + jumps + repeated_rows > 0 {
             writeln!(f, "{gaps} gap(s), {jumps} jump(s) of an angle, {repeated_rows} row(s) that repeat the angles")?;
+        }
+        if self.disturbances > 0 {
+            writeln!(f, "{} short disturbance(s), over before they could be explained", self.disturbances)?;
         }
         for limit in &self.limits {
             writeln!(f, "{limit}")?;

@@ -21,6 +21,7 @@ fn main() {
     let hours = number(3, 0.5);
     let mut alarms = 0;
     let mut told = 0;
+    let mut disturbances = 0;
     let started = Instant::now();
     for seed in first..first + seeds {
         let (model, at) = scene(scenario);
@@ -38,12 +39,13 @@ fn main() {
         }
         let summary = monitor.summary();
         told += summary.followed;
+        disturbances += summary.disturbances;
         if seed == first {
             println!("{summary}");
         }
     }
     let watched = hours * seeds as f64;
-    println!("{scenario}: {alarms} alarms, {told} followed, in {watched:.1} h of {seeds} machine(s), {:.0} s", started.elapsed().as_secs_f64());
+    println!("{scenario}: {alarms} alarms, {told} followed, {disturbances} disturbances, in {watched:.1} h of {seeds} machine(s), {:.0} s", started.elapsed().as_secs_f64());
     if scenario == "speed" {
         speed();
     }
