@@ -18,6 +18,7 @@ mod interrupt;
 mod list;
 mod mbrl;
 mod merge;
+mod monitor;
 mod new;
 mod notes;
 mod progress;
@@ -70,6 +71,7 @@ enum Command {
     Sweep(sweep::Arguments),
     Evaluate(evaluate::Arguments),
     Control(control::Arguments),
+    Monitor(monitor::Arguments),
     Mbrl(mbrl::Arguments),
     Experiment(experiment::Arguments),
     Simulate(simulate::Arguments),
@@ -156,6 +158,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Control(arguments) => control::run(&arguments),
+        Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Mbrl(arguments) => mbrl::run(&arguments),
         Command::Experiment(arguments) => experiment::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),

@@ -16,6 +16,16 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// No row yet, of a model with this many joints and further measured columns.
+    pub fn none(joints: usize, measured: usize) -> Self {
+        Self {
+            time: Vec::new(),
+            q: vec![Vec::new(); joints],
+            driven: vec![Vec::new(); joints],
+            measured: vec![Vec::new(); measured],
+        }
+    }
+
     /// The rows of a log; `measured` are the names of the model's further measured columns.
     ///
     /// # Errors
