@@ -511,7 +511,7 @@ class Monitor:
         model: Model,
         *,
         false_alarms_per_hour: float = 0.1,
-        healthy_s: float = 60.0,
+        healthy_s: float = 300.0,
         block_s: float = 1.0,
         smoothing_s: float | None = None,
         payload_at: tuple[float, float, float] | None = None,

@@ -31,7 +31,7 @@ pub struct Monitor {
 #[allow(clippy::needless_pass_by_value)]
 impl Monitor {
     #[new]
-    #[pyo3(signature = (model, *, false_alarms_per_hour=0.1, healthy_s=60.0, block_s=1.0, smoothing_s=None, payload_at=None))]
+    #[pyo3(signature = (model, *, false_alarms_per_hour=0.1, healthy_s=300.0, block_s=1.0, smoothing_s=None, payload_at=None))]
     fn new(
         model: PyRef<'_, Model>,
         false_alarms_per_hour: f64,

@@ -4,11 +4,10 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::block::{Block, Columns, JointSums, Sums};
 use super::hypothesis::Hypothesis;
+use super::tails;
 
 /// Probes count as one where all but this share of one is the other.
 const SAME_PROBE: f64 = 1e-6;
-/// A combination of probes of which a block shows this small a share of what the mean block does is not shown by it.
-const LEAST_SHOWN: f64 = 1e-3;
 /// What is added to information of unit diagonal so that it can be inverted; far below what noise leaves of it.
 const RIDGE: f64 = 1e-9;
 /// Correlation of neighbouring blocks beyond which blocks are too short to say how far their sums scatter.
@@ -78,13 +77,10 @@ impl Baseline {
             })
             .collect();
         // How far scores scatter decides what the priors weigh, and the offsets decide how far scores scatter.
-        let mut found = Self::with_priors(&each, &total, &weights, columns, |column| 1.0 / priors[column]);
-        for _ in 0..2 {
-            let scatter = found.hypotheses.clone();
-            let weighs = |column: usize| scatter.get(column).map_or(1.0, |own| own.variance) / priors[column];
-            found = Self::with_priors(&each, &total, &weights, columns, weighs);
-        }
-        Some(found)
+        let first = Self::with_priors(&each, &total, &weights, columns, |column| 1.0 / priors[column]);
+        let scatter = first.hypotheses;
+        let weighs = |column: usize| scatter.get(column).map_or(1.0, |own| own.variance) / priors[column];
+        Some(Self::with_priors(&each, &total, &weights, columns, weighs))
     }
 
     fn with_priors(
@@ -100,11 +96,18 @@ impl Baseline {
         }
         let covariance = inverted(&information);
         let offset = &covariance * &total.score;
-        let left: Vec<DVector<f64>> = each.iter().map(|sums| &sums.score - &sums.information * &offset).collect();
+        // Each block by the offsets that all others give: those that it gives itself would take its scatter away.
+        let left_out = |own: &Sums| {
+            let of_others = inverted(&(&information - &own.information));
+            let offset = &of_others * (&total.score - &own.score);
+            let score = &own.score - &own.information * offset;
+            let information = &own.information + &own.information * of_others * &own.information;
+            Sums { score, information, ..own.clone() }
+        };
+        let left: Vec<Sums> = each.iter().map(left_out).collect();
         let scatter = |column: usize| {
-            let own = each.iter().zip(&left);
-            let own: Vec<[f64; 2]> = own.map(|(sums, left)| [left[column], sums.information[(column, column)]]).collect();
-            scatter(&own)
+            let own = left.iter().map(|sums| [sums.score[column], sums.information[(column, column)]]);
+            scatter(&own.collect::<Vec<[f64; 2]>>())
         };
         let probes = |joint: usize| (weights[joint] > 0.0).then(|| probes(each, &left, columns.probes(joint)));
         Self {
@@ -197,11 +200,15 @@ fn scatter(blocks: &[[f64; 2]]) -> Scatter {
         true => score / information.sqrt(),
         false => 0.0,
     });
-    let longer = lasting(&scaled.collect::<Vec<f64>>());
+    let scaled: Vec<f64> = scaled.collect();
+    let longer = lasting(&scaled);
+    // Two values, those of offset and scatter, come from the same blocks.
+    let variance = square / information * count / (count - 2.0);
+    let largest = scaled.iter().map(|draw| draw * draw).fold(0.0, f64::max) / variance;
+    let freedom = ((count - 2.0) / longer).max(3.0);
     Scatter {
-        // Two values, those of offset and scatter, come from the same blocks.
-        variance: longer * square / information * count / (count - 2.0),
-        freedom: ((count - 2.0) / longer).max(3.0),
+        variance: variance * longer.max(heaviness(largest, tails::t_squared(0.5 / count, freedom))),
+        freedom,
     }
 }
 
@@ -217,10 +224,16 @@ fn lasting(draws: &[f64]) -> f64 {
     }
 }
 
+/// By what factor a variance has to be larger for the largest of the healthy blocks to be where it is as often as not: tails
+/// that are heavier than those of a normal distribution.
+fn heaviness(largest: f64, usual: f64) -> f64 {
+    (largest / usual).max(1.0)
+}
+
 /// `None` if none of the probes is excited.
 fn probes(
     each: &[Sums],
-    left: &[DVector<f64>],
+    left: &[Sums],
     places: std::ops::Range<usize>,
 ) -> Option<ProbeScatter> {
     let (first, count) = (places.start, places.len());
@@ -239,22 +252,35 @@ fn probes(
         eigenvectors[(k, kept[i])] * scale[k] / eigenvalues[kept[i]].sqrt()
     });
     // As they would be if each block had the information of the mean.
-    let draw = |(sums, left): (&Sums, &DVector<f64>)| -> DVector<f64> {
-        let own = &to_independent * square(sums) * to_independent.transpose();
-        let SymmetricEigen { eigenvalues, eigenvectors } = own.symmetric_eigen();
-        let inverse = eigenvalues.map(|value| if value > LEAST_SHOWN { value.sqrt().recip() } else { 0.0 });
-        let draw = eigenvectors.transpose() * (&to_independent * left.rows(first, count));
-        &eigenvectors * draw.component_mul(&inverse)
+    let draw = |left: &Sums| -> DVector<f64> {
+        let scale = spreading(&(&to_independent * square(left) * to_independent.transpose()));
+        let draw = &to_independent * left.score.rows(first, count);
+        let SymmetricEigen { eigenvalues, eigenvectors } = scale.symmetric_eigen();
+        let inverse = eigenvalues.map(|value| if value > 0.0 { value.sqrt().recip() } else { 0.0 });
+        &eigenvectors * (eigenvectors.transpose() * draw).component_mul(&inverse)
     };
-    let draws: Vec<DVector<f64>> = each.iter().zip(left).map(draw).collect();
+    let draws: Vec<DVector<f64>> = left.iter().map(draw).collect();
     let covariance = draws.iter().fold(DMatrix::zeros(kept.len(), kept.len()), |sum, draw| sum + draw * draw.transpose());
     let of_row = |row: usize| lasting(&draws.iter().map(|draw| draw[row]).collect::<Vec<f64>>());
     let longer = (0..kept.len()).map(of_row).sum::<f64>() / kept.len() as f64;
+    let covariance = covariance / (blocks - 2.0);
+    let independent = ((blocks - 2.0) / longer).max(kept.len() as f64 + 3.0);
+    let inverse = covariance.clone().cholesky()?;
+    let largest = draws.iter().map(|draw| draw.dot(&inverse.solve(draw))).fold(0.0, f64::max);
+    let usual = tails::hotelling(0.5 / blocks, kept.len(), independent);
     Some(ProbeScatter {
         to_independent,
-        root: root(&(covariance * (longer / (blocks - 2.0)))),
-        blocks: ((blocks - 2.0) / longer).max(kept.len() as f64 + 3.0),
+        root: root(&(covariance * longer.max(heaviness(largest, usual)))),
+        blocks: independent,
     })
+}
+
+/// How the covariance of a window's scores goes with its information about independent probes: half by each direction, half
+/// by the whole. Noise that is not white puts some into directions that a short window hardly shows.
+pub(crate) fn spreading(information: &DMatrix<f64>) -> DMatrix<f64> {
+    let count = information.nrows();
+    let whole = information.trace() / count as f64;
+    0.5 * (information + DMatrix::identity(count, count) * whole)
 }
 
 /// The symmetric root of a covariance.

@@ -11,7 +11,7 @@ use super::judgement::Verdict;
 pub(crate) const PROBES: usize = 6;
 
 /// Means in a run of which the ends make up half of the noise: windows overlap by a quarter, and reach two over.
-const CANCELLING: f64 = 8.0;
+const CANCELLING: f64 = 16.0;
 
 /// Which columns the residual of each joint depends on: hypotheses first, then the probes of each joint.
 #[derive(Debug, Clone)]

@@ -1,8 +1,8 @@
 //! What the latest windows say: whether something has changed, and what explains it.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
-use super::baseline::Baseline;
+use super::baseline::{Baseline, spreading};
 use super::block::{Columns, Sums};
 use super::history::History;
 use super::hypothesis::Hypothesis;
@@ -13,8 +13,6 @@ use super::{Settings, tails};
 const LEFT_BY_CHANCE: f64 = 0.003;
 /// if it is this small a share of the whole: regressors of a model are not exact.
 const LEFT_BY_MODEL: f64 = 0.03;
-/// Combinations of probes with this share of the largest variance are not shown by a window.
-const LEAST_SHOWN: f64 = 1e-4;
 /// Two explanations whose likelihoods differ by less than a factor of 100 explain alike: twice its logarithm.
 const ALIKE: f64 = 9.2;
 
@@ -173,7 +171,10 @@ impl Judge<'_> {
         let score = &own.to_independent * score.rows(first, count);
         let information = window.information.view((first, first), (count, count));
         let information = &own.to_independent * information * own.to_independent.transpose();
-        let scatter = &own.root * information * &own.root;
+        if !(information.trace() > 0.0) {
+            return 0.0;
+        }
+        let scatter = &own.root * spreading(&information) * &own.root;
         let floor = squared_length(&scatter, &score);
         if floor < 0.1 * threshold {
             return floor;
@@ -224,11 +225,8 @@ impl Judge<'_> {
 /// A standard normal variable is below it nine times in ten.
 const NINE_IN_TEN: f64 = 1.2816;
 
-/// `v' C^-1 v`, over the directions that a window shows at all.
+/// `v' C^-1 v`; zero if the covariance cannot be inverted.
 fn squared_length(covariance: &DMatrix<f64>, vector: &DVector<f64>) -> f64 {
-    let SymmetricEigen { eigenvalues, eigenvectors } = covariance.clone().symmetric_eigen();
-    let least = LEAST_SHOWN * eigenvalues.max();
-    let parts = eigenvectors.transpose() * vector;
-    let parts = parts.iter().zip(&eigenvalues).filter(|(_, value)| **value > least);
-    parts.map(|(part, value)| part * part / value).sum()
+    let cholesky = covariance.clone().cholesky();
+    cholesky.map_or(0.0, |cholesky| vector.dot(&cholesky.solve(vector)))
 }

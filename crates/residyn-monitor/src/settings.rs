@@ -18,11 +18,11 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// One false alarm in ten hours, after a healthy minute.
+    /// One false alarm in ten hours, after five healthy minutes.
     fn default() -> Self {
         Self {
             false_alarms_per_hour: 0.1,
-            healthy_s: 60.0,
+            healthy_s: 300.0,
             block_s: 1.0,
             smoothing_s: None,
             payload_at: None,

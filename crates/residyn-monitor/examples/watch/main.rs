@@ -1,4 +1,4 @@
-//! Simulated machines under watch: `watch SCENARIO FIRST-SEED SEEDS [HOURS]`. Prints what is alarmed, and the rate of false
+//! Simulated machines under watch: `watch SCENARIO FIRST-SEED SEEDS [HOURS] [HEALTHY-S]`. Prints what is alarmed, and the rate of false
 //! alarms of healthy machines.
 
 mod machines;
@@ -25,7 +25,8 @@ fn main() {
     let started = Instant::now();
     for seed in first..first + seeds {
         let (model, at) = scene(scenario);
-        let mut monitor = Monitor::new(&model, Settings::default()).expect("a monitor");
+        let settings = Settings { healthy_s: number(4, Settings::default().healthy_s), ..Settings::default() };
+        let mut monitor = Monitor::new(&model, settings).expect("a monitor");
         let mut time = 0.0;
         let mut part = 0;
         while time < 3600.0 * hours {
