@@ -101,7 +101,9 @@ impl fmt::Display for Alarm {
 
 impl fmt::Display for Named {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { what, name, label, .. } = self;
+        let Self {
+            what, name, label, ..
+        } = self;
         match (self.kind, &self.estimate) {
             (Kind::Parameter, Some(estimate)) if what == name => {
                 write!(f, "{name} of joint {label} {estimate}")

@@ -62,7 +62,11 @@ impl Average {
         self.rows.extend_from_slice(row);
         self.along.push(along);
         let Some(first) = self.along.len().checked_sub(self.weights.len()) else {
-            return if is_first { Averaged::Interrupted } else { Averaged::Nothing };
+            return if is_first {
+                Averaged::Interrupted
+            } else {
+                Averaged::Nothing
+            };
         };
         if self.until_mean > 0 {
             self.until_mean -= 1;

@@ -14,6 +14,11 @@ const RIDGE: f64 = 1e-9;
 const MOST_CORRELATED: f64 = 0.8;
 /// A residual that is this small a share of the torques is rounding.
 const ROUNDING: f64 = 1e-20;
+/// The share of a joint's residual that the misfit of a good model may be in a direction, depending on the motion.
+const MISFIT: f64 = 0.05;
+/// Lengths of the windows in whose statistics tails are looked at, in blocks, and the least number of them.
+const WINDOWS: [usize; 3] = [1, 4, 16];
+const LEAST_WINDOWS: f64 = 8.0;
 /// The misfit that the probes may have before any data, in standard deviations of the residual.
 const PROBE_PRIOR: f64 = 10.0;
 
@@ -38,6 +43,8 @@ pub(crate) struct Scatter {
     pub variance: f64,
     /// Independent blocks that it is known from, less one.
     pub freedom: f64,
+    /// What the model's misfit adds to the variance, per square of the information.
+    pub misfit: f64,
 }
 
 /// How far the scores of a joint's probes scatter.
@@ -49,6 +56,8 @@ pub(crate) struct ProbeScatter {
     pub root: DMatrix<f64>,
     /// Independent blocks that it is known from.
     pub blocks: f64,
+    /// What the model's misfit adds to the covariance, per square of the information.
+    pub misfit: f64,
 }
 
 impl Baseline {
@@ -59,10 +68,15 @@ impl Baseline {
         if weights.iter().all(|weight| *weight == 0.0) {
             return None;
         }
-        let each: Vec<Sums> = blocks.iter().map(|block| Sums::of(block, columns, &weights)).collect();
+        let each: Vec<Sums> = blocks
+            .iter()
+            .map(|block| Sums::of(block, columns, &weights))
+            .collect();
         let mut total = each[0].clone();
         each[1..].iter().for_each(|sums| total.add(sums));
-        let samples = |joint: usize| -> usize { blocks.iter().map(|block| block.joints[joint].samples).sum() };
+        let samples = |joint: usize| -> usize {
+            blocks.iter().map(|block| block.joints[joint].samples).sum()
+        };
         let priors: Vec<f64> = (0..columns.count())
             .map(|column| match hypotheses.get(column) {
                 Some(hypothesis) => hypothesis.prior.powi(2),
@@ -77,10 +91,15 @@ impl Baseline {
             })
             .collect();
         // How far scores scatter decides what the priors weigh, and the offsets decide how far scores scatter.
-        let first = Self::with_priors(&each, &total, &weights, columns, |column| 1.0 / priors[column]);
+        let first = Self::with_priors(&each, &total, &weights, columns, |column| {
+            1.0 / priors[column]
+        });
         let scatter = first.hypotheses;
-        let weighs = |column: usize| scatter.get(column).map_or(1.0, |own| own.variance) / priors[column];
-        Some(Self::with_priors(&each, &total, &weights, columns, weighs))
+        let weighs =
+            |column: usize| scatter.get(column).map_or(1.0, |own| own.variance) / priors[column];
+        let mut found = Self::with_priors(&each, &total, &weights, columns, weighs);
+        found.give_misfit(&total, columns, hypotheses);
+        Some(found)
     }
 
     fn with_priors(
@@ -102,20 +121,57 @@ impl Baseline {
             let offset = &of_others * (&total.score - &own.score);
             let score = &own.score - &own.information * offset;
             let information = &own.information + &own.information * of_others * &own.information;
-            Sums { score, information, ..own.clone() }
+            Sums {
+                score,
+                information,
+                ..own.clone()
+            }
         };
         let left: Vec<Sums> = each.iter().map(left_out).collect();
         let scatter = |column: usize| {
-            let own = left.iter().map(|sums| [sums.score[column], sums.information[(column, column)]]);
+            let own = left
+                .iter()
+                .map(|sums| [sums.score[column], sums.information[(column, column)]]);
             scatter(&own.collect::<Vec<[f64; 2]>>())
         };
-        let probes = |joint: usize| (weights[joint] > 0.0).then(|| probes(each, &left, columns.probes(joint)));
+        let probes = |joint: usize| {
+            (weights[joint] > 0.0).then(|| probes(each, &left, columns.probes(joint)))
+        };
         Self {
             weights: weights.to_vec(),
             hypotheses: (0..columns.hypotheses).map(scatter).collect(),
-            probes: (0..weights.len()).map(|joint| probes(joint).flatten()).collect(),
+            probes: (0..weights.len())
+                .map(|joint| probes(joint).flatten())
+                .collect(),
             offset,
             covariance,
+        }
+    }
+
+    /// A misfit of the model that changes with the motion does not average out as noise does: in every direction it may be this
+    /// share of the residual.
+    fn give_misfit(&mut self, total: &Sums, columns: &Columns, hypotheses: &[Hypothesis]) {
+        let blocks = total.blocks as f64;
+        // The first probe is the constant: its information is the number of means.
+        let means = |joint: usize| {
+            let first = columns.probes(joint).start;
+            match self.weights[joint] > 0.0 {
+                true => total.information[(first, first)] / self.weights[joint] / blocks,
+                false => 0.0,
+            }
+        };
+        let joints = 0..self.weights.len();
+        let variance: Vec<f64> = joints.map(|joint| MISFIT.powi(2) * means(joint)).collect();
+        for (h, own) in self.hypotheses.iter_mut().enumerate() {
+            let information = total.information[(h, h)] / blocks;
+            if information > 0.0 {
+                own.misfit = variance[hypotheses[h].joint] / information;
+            }
+        }
+        for (own, variance) in self.probes.iter_mut().zip(variance) {
+            if let Some(own) = own {
+                own.misfit = variance;
+            }
         }
     }
 
@@ -138,7 +194,10 @@ impl Baseline {
         // (C^-1 + A)^-1 = C - C A (1 + C A)^-1 C
         let through = &self.covariance * &window.information;
         let count = through.nrows();
-        let Some(gain) = (DMatrix::identity(count, count) + &through).lu().solve(&self.covariance) else {
+        let Some(gain) = (DMatrix::identity(count, count) + &through)
+            .lu()
+            .solve(&self.covariance)
+        else {
             return;
         };
         self.covariance = 0.5 * (&gain + gain.transpose());
@@ -149,7 +208,9 @@ impl Baseline {
 /// 1 / variance of a joint's residual about its own regression; zero if the joint does not move.
 fn weight<'b>(blocks: impl Iterator<Item = &'b JointSums>) -> f64 {
     let mut blocks = blocks;
-    let Some(mut total) = blocks.next().cloned() else { return 0.0 };
+    let Some(mut total) = blocks.next().cloned() else {
+        return 0.0;
+    };
     for own in blocks {
         total.samples += own.samples;
         total.score += &own.score;
@@ -170,9 +231,13 @@ fn weight<'b>(blocks: impl Iterator<Item = &'b JointSums>) -> f64 {
 
 /// The inverse of an information matrix, whose columns may have any scale. A column without information stays without.
 fn inverted(information: &DMatrix<f64>) -> DMatrix<f64> {
-    let scale = information.diagonal().map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
+    let scale = information
+        .diagonal()
+        .map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
     let count = scale.len();
-    let mut scaled = DMatrix::from_fn(count, count, |i, k| information[(i, k)] * scale[i] * scale[k]);
+    let mut scaled = DMatrix::from_fn(count, count, |i, k| {
+        information[(i, k)] * scale[i] * scale[k]
+    });
     for k in 0..count {
         scaled[(k, k)] = 1.0 + RIDGE;
     }
@@ -180,7 +245,10 @@ fn inverted(information: &DMatrix<f64>) -> DMatrix<f64> {
         Some(cholesky) => cholesky.inverse(),
         // Rounding: the nearest matrix that can be inverted.
         None => {
-            let SymmetricEigen { eigenvalues, eigenvectors } = scaled.symmetric_eigen();
+            let SymmetricEigen {
+                eigenvalues,
+                eigenvectors,
+            } = scaled.symmetric_eigen();
             let inverse = DMatrix::from_diagonal(&eigenvalues.map(|value| 1.0 / value.max(RIDGE)));
             &eigenvectors * inverse * eigenvectors.transpose()
         }
@@ -193,22 +261,31 @@ fn scatter(blocks: &[[f64; 2]]) -> Scatter {
     let count = blocks.len() as f64;
     let information: f64 = blocks.iter().map(|[_, information]| information).sum();
     if !(information > 0.0) {
-        return Scatter { variance: 0.0, freedom: 1.0 };
+        return Scatter {
+            variance: 0.0,
+            freedom: 1.0,
+            misfit: 0.0,
+        };
     }
     let square: f64 = blocks.iter().map(|[score, _]| score * score).sum();
-    let scaled = blocks.iter().map(|[score, information]| match *information > 0.0 {
-        true => score / information.sqrt(),
-        false => 0.0,
-    });
+    let scaled = blocks
+        .iter()
+        .map(|[score, information]| match *information > 0.0 {
+            true => score / information.sqrt(),
+            false => 0.0,
+        });
     let scaled: Vec<f64> = scaled.collect();
     let longer = lasting(&scaled);
     // Two values, those of offset and scatter, come from the same blocks.
     let variance = square / information * count / (count - 2.0);
-    let largest = scaled.iter().map(|draw| draw * draw).fold(0.0, f64::max) / variance;
     let freedom = ((count - 2.0) / longer).max(3.0);
+    let draws: Vec<DVector<f64>> = scaled.iter().map(|draw| DVector::from_element(1, *draw)).collect();
+    let square = |draw: &DVector<f64>| draw[0] * draw[0] / variance;
+    let heavier = heaviness(&draws, square, |p| tails::t_squared(p, freedom));
     Scatter {
-        variance: variance * longer.max(heaviness(largest, tails::t_squared(0.5 / count, freedom))),
+        variance: variance * longer.max(heavier),
         freedom,
+        misfit: 0.0,
     }
 }
 
@@ -224,27 +301,52 @@ fn lasting(draws: &[f64]) -> f64 {
     }
 }
 
-/// By what factor a variance has to be larger for the largest of the healthy blocks to be where it is as often as not: tails
-/// that are heavier than those of a normal distribution.
-fn heaviness(largest: f64, usual: f64) -> f64 {
-    (largest / usual).max(1.0)
+/// By what factor a variance has to be larger for the largest statistic of healthy windows of any of these lengths to be
+/// where it is as often as not: tails that are heavier than those of a normal distribution, and misfits that last.
+fn heaviness(
+    draws: &[DVector<f64>],
+    statistic: impl Fn(&DVector<f64>) -> f64,
+    threshold: impl Fn(f64) -> f64,
+) -> f64 {
+    let of_length = |length: &usize| {
+        let windows = draws.chunks_exact(*length);
+        let count = windows.len() as f64;
+        let sum = |window: &[DVector<f64>]| -> f64 {
+            let sum = window.iter().fold(window[0].clone() * 0.0, |sum, draw| sum + draw);
+            statistic(&(sum / (*length as f64).sqrt()))
+        };
+        match count >= LEAST_WINDOWS {
+            true => windows.map(sum).fold(0.0, f64::max) / threshold(0.5 / count),
+            false => 1.0,
+        }
+    };
+    WINDOWS.iter().map(of_length).fold(1.0, f64::max)
 }
 
 /// `None` if none of the probes is excited.
-fn probes(
-    each: &[Sums],
-    left: &[Sums],
-    places: std::ops::Range<usize>,
-) -> Option<ProbeScatter> {
+fn probes(each: &[Sums], left: &[Sums], places: std::ops::Range<usize>) -> Option<ProbeScatter> {
     let (first, count) = (places.start, places.len());
     let blocks = each.len() as f64;
-    let square = |sums: &Sums| sums.information.view((first, first), (count, count)).into_owned();
-    let mean = each.iter().map(square).fold(DMatrix::zeros(count, count), |sum, own| sum + own) / blocks;
+    let square = |sums: &Sums| {
+        sums.information
+            .view((first, first), (count, count))
+            .into_owned()
+    };
+    let mean = each
+        .iter()
+        .map(square)
+        .fold(DMatrix::zeros(count, count), |sum, own| sum + own)
+        / blocks;
     let information = mean.diagonal();
     let scale = information.map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
     let scaled = DMatrix::from_fn(count, count, |i, k| mean[(i, k)] * scale[i] * scale[k]);
-    let SymmetricEigen { eigenvalues, eigenvectors } = scaled.symmetric_eigen();
-    let kept: Vec<usize> = (0..count).filter(|k| eigenvalues[*k] > SAME_PROBE * count as f64).collect();
+    let SymmetricEigen {
+        eigenvalues,
+        eigenvectors,
+    } = scaled.symmetric_eigen();
+    let kept: Vec<usize> = (0..count)
+        .filter(|k| eigenvalues[*k] > SAME_PROBE * count as f64)
+        .collect();
     if kept.is_empty() {
         return None;
     }
@@ -255,23 +357,38 @@ fn probes(
     let draw = |left: &Sums| -> DVector<f64> {
         let scale = spreading(&(&to_independent * square(left) * to_independent.transpose()));
         let draw = &to_independent * left.score.rows(first, count);
-        let SymmetricEigen { eigenvalues, eigenvectors } = scale.symmetric_eigen();
-        let inverse = eigenvalues.map(|value| if value > 0.0 { value.sqrt().recip() } else { 0.0 });
+        let SymmetricEigen {
+            eigenvalues,
+            eigenvectors,
+        } = scale.symmetric_eigen();
+        let inverse = eigenvalues.map(|value| {
+            if value > 0.0 {
+                value.sqrt().recip()
+            } else {
+                0.0
+            }
+        });
         &eigenvectors * (eigenvectors.transpose() * draw).component_mul(&inverse)
     };
     let draws: Vec<DVector<f64>> = left.iter().map(draw).collect();
-    let covariance = draws.iter().fold(DMatrix::zeros(kept.len(), kept.len()), |sum, draw| sum + draw * draw.transpose());
+    let covariance = draws
+        .iter()
+        .fold(DMatrix::zeros(kept.len(), kept.len()), |sum, draw| {
+            sum + draw * draw.transpose()
+        });
     let of_row = |row: usize| lasting(&draws.iter().map(|draw| draw[row]).collect::<Vec<f64>>());
     let longer = (0..kept.len()).map(of_row).sum::<f64>() / kept.len() as f64;
     let covariance = covariance / (blocks - 2.0);
     let independent = ((blocks - 2.0) / longer).max(kept.len() as f64 + 3.0);
     let inverse = covariance.clone().cholesky()?;
-    let largest = draws.iter().map(|draw| draw.dot(&inverse.solve(draw))).fold(0.0, f64::max);
-    let usual = tails::hotelling(0.5 / blocks, kept.len(), independent);
+    let square = |draw: &DVector<f64>| draw.dot(&inverse.solve(draw));
+    let threshold = |p: f64| tails::hotelling(p, kept.len(), independent);
+    let heavier = heaviness(&draws, square, threshold);
     Some(ProbeScatter {
         to_independent,
-        root: root(&(covariance * longer.max(heaviness(largest, usual)))),
+        root: root(&(covariance * longer.max(heavier))),
         blocks: independent,
+        misfit: 0.0,
     })
 }
 
@@ -285,7 +402,10 @@ pub(crate) fn spreading(information: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// The symmetric root of a covariance.
 pub(crate) fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-    let SymmetricEigen { eigenvalues, eigenvectors } = covariance.clone().symmetric_eigen();
+    let SymmetricEigen {
+        eigenvalues,
+        eigenvectors,
+    } = covariance.clone().symmetric_eigen();
     let roots = DMatrix::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
     &eigenvectors * roots * eigenvectors.transpose()
 }

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::averages::{Averaged, Averages};
 use super::equations::Equations;
 use super::grid::Sample;
-use super::averages::{Averaged, Averages};
 use super::judgement::Verdict;
 
 /// Smooth functions of a joint's angle, speed and direction, which stand for whatever the model lacks there.
@@ -40,7 +40,9 @@ impl Columns {
     /// no regressor is exact.
     pub fn free_with(&self, verdict: &Verdict) -> Vec<usize> {
         let acts_on = |joint: &usize| match verdict {
-            Verdict::Named(of) => of.first().is_some_and(|h| self.of_joint[*joint].contains(h)),
+            Verdict::Named(of) => of
+                .first()
+                .is_some_and(|h| self.of_joint[*joint].contains(h)),
             Verdict::Unexplained(own) => own == joint,
         };
         let joints = (0..self.of_joint.len()).filter(acts_on);
@@ -105,8 +107,16 @@ impl Block {
             row.extend_from_slice(regressors);
             row.extend([1.0, angle, angle * angle, speed, direction, angle * speed]);
             // A direction of motion, or none.
-            let along = if speed.abs() < usual.resting[joint] { 0.0 } else { speed.signum() };
-            let along = if usual.resting[joint] > 0.0 { along } else { 1.0 };
+            let along = if speed.abs() < usual.resting[joint] {
+                0.0
+            } else {
+                speed.signum()
+            };
+            let along = if usual.resting[joint] > 0.0 {
+                along
+            } else {
+                1.0
+            };
             match averages.of_joint[joint].push(&row, along, sample.is_first) {
                 Averaged::Mean([residual, x @ ..]) => runs[joint].add(*residual, x),
                 Averaged::Interrupted => joints[joint].take(&mut runs[joint]),

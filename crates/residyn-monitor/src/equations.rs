@@ -61,7 +61,9 @@ pub(crate) fn compile(
     let wrt: Vec<Node> = parameters.iter().map(|k| inputs[first + k]).collect();
     let slopes = graph.jacobian(&residuals, &wrt);
     let rows_of = |k: usize| -> Vec<usize> {
-        (0..joints).filter(|j| !graph.is_zero(slopes[*j][k])).collect()
+        (0..joints)
+            .filter(|j| !graph.is_zero(slopes[*j][k]))
+            .collect()
     };
     let candidates = candidates(model, &extended, &compiled, rows_of);
     if !(candidates.iter()).any(|(_, candidate)| candidate.kind != Kind::EncoderZero) {
@@ -74,10 +76,13 @@ pub(crate) fn compile(
     for of_joint in &slopes {
         let own = candidates.iter().enumerate();
         let own = own.filter(|(_, (k, _))| !graph.is_zero(of_joint[*k]));
-        columns_of.push(own.map(|(column, (k, _))| {
-            all.push(of_joint[*k]);
-            column
-        }).collect());
+        columns_of.push(
+            own.map(|(column, (k, _))| {
+                all.push(of_joint[*k]);
+                column
+            })
+            .collect(),
+        );
     }
     let equations = Equations {
         tape: graph.finish(&all).tape_at(first, &values),
@@ -85,7 +90,10 @@ pub(crate) fn compile(
         is_balance,
         columns_of,
     };
-    Ok((equations, candidates.into_iter().map(|(_, own)| own).collect()))
+    Ok((
+        equations,
+        candidates.into_iter().map(|(_, own)| own).collect(),
+    ))
 }
 
 /// The model with a zero of each encoder and a load at each tip, none of which is there.
@@ -105,7 +113,9 @@ fn with_candidates(model: &Model, settings: &Settings) -> Model {
             add(FittedEffect::absent(offset, joint), &[]);
         }
         if let Ok(payload) = library.effect("payload") {
-            let [x, y, z] = settings.payload_at.unwrap_or_else(|| centre_of_mass(model, joint));
+            let [x, y, z] = settings
+                .payload_at
+                .unwrap_or_else(|| centre_of_mass(model, joint));
             add(FittedEffect::absent(payload, joint), &[0.0, x, y, z]);
         }
     }
@@ -148,7 +158,8 @@ fn candidates(
         let is_added = owner.is_some_and(|(effect, _)| effect >= own_effects);
         let is_first = owner.is_some_and(|(_, place)| place == 0);
         let is_named = |name: &str| effect.is_some_and(|effect| effect.effect.name == name);
-        let is_mass = !is_tree && parameter.unit == "kg" && outermost.next().index() == model.joints;
+        let is_mass =
+            !is_tree && parameter.unit == "kg" && outermost.next().index() == model.joints;
         let kind = match () {
             () if is_named("sensor_offset") => Kind::EncoderZero,
             // Where a load sits changes nothing while there is none.
@@ -185,7 +196,9 @@ fn candidates(
 fn owners(model: &Model) -> Vec<(usize, usize)> {
     let effects = model.effects.iter().enumerate();
     let of_effect = |(index, effect): (usize, &FittedEffect)| {
-        (0..effect.values.len()).map(move |place| (index, place)).collect::<Vec<_>>()
+        (0..effect.values.len())
+            .map(move |place| (index, place))
+            .collect::<Vec<_>>()
     };
     effects.flat_map(of_effect).collect()
 }

@@ -13,7 +13,9 @@ pub enum MonitorError {
         "the effect {effect} of {model} has states of its own, which a monitor does not follow; monitor the model without it"
     )]
     InternalStates { model: String, effect: String },
-    #[error("{model} has no free parameter, so nothing can be named; free what may wear in the model file")]
+    #[error(
+        "{model} has no free parameter, so nothing can be named; free what may wear in the model file"
+    )]
     NothingFree { model: String },
     #[error("{found} column(s) of {what} for {wanted}; give one for each")]
     Columns {
@@ -21,13 +23,17 @@ pub enum MonitorError {
         found: usize,
         wanted: String,
     },
-    #[error("row {row}: column \"{column}\" ends at row {rows} of the batch; give every column as many rows as the time")]
+    #[error(
+        "row {row}: column \"{column}\" ends at row {rows} of the batch; give every column as many rows as the time"
+    )]
     Length {
         row: usize,
         column: String,
         rows: usize,
     },
-    #[error("row {row}, column \"{column}\": {value} is not a number; leave the row out, the gap is counted")]
+    #[error(
+        "row {row}, column \"{column}\": {value} is not a number; leave the row out, the gap is counted"
+    )]
     NotFinite {
         row: usize,
         column: String,

@@ -114,6 +114,8 @@ impl Grid {
         }
         if row.q == self.since[0].q && self.since.len() < RESTING_ROWS {
             self.irregular.repeated += 1;
+            // The next angle is two steps away from the last.
+            self.last.clear();
             return self.since.push(row);
         }
         if self.jumps(&row) {
@@ -185,7 +187,11 @@ impl Grid {
             return self.held_at(time + 0.5 * self.step_s, new).driven.clone();
         }
         let before = self.held_at(time, new);
-        let after = self.since.iter().chain([new]).find(|row| row.time > before.time);
+        let after = self
+            .since
+            .iter()
+            .chain([new])
+            .find(|row| row.time > before.time);
         let Some(after) = after else {
             return before.driven.clone();
         };
@@ -197,9 +203,17 @@ impl Grid {
     /// What the newest even row completes.
     fn observe(&mut self, samples: &mut Vec<Sample>) {
         let half = self.kernel.half;
-        let reach = self.delayed.iter().map(|own| own.past).fold(half, usize::max);
+        let reach = self
+            .delayed
+            .iter()
+            .map(|own| own.past)
+            .fold(half, usize::max);
         // A held torque that is a mean over the step before its row is centred one row later.
-        let centre = self.even.len().checked_sub(half + 2).filter(|centre| *centre >= reach);
+        let centre = self
+            .even
+            .len()
+            .checked_sub(half + 2)
+            .filter(|centre| *centre >= reach);
         let Some(centre) = centre else { return };
         if self.until_sample == 0 {
             samples.push(self.sample(centre));
@@ -212,17 +226,27 @@ impl Grid {
 
     fn smoothed(&self, weights: &[f64], centre: usize, joint: usize) -> f64 {
         let rows = self.even[centre - self.kernel.half..].iter();
-        weights.iter().zip(rows).map(|(w, row)| w * row.q[joint]).sum()
+        weights
+            .iter()
+            .zip(rows)
+            .map(|(w, row)| w * row.q[joint])
+            .sum()
     }
 
     fn sample(&self, centre: usize) -> Sample {
         let joints = 0..self.widths.len();
         let of_angles = |weights: &[f64]| -> Vec<f64> {
-            (joints.clone()).map(|joint| self.smoothed(weights, centre, joint)).collect()
+            (joints.clone())
+                .map(|joint| self.smoothed(weights, centre, joint))
+                .collect()
         };
         let driven = self.delayed.iter().enumerate().map(|(joint, own)| {
             let rows = self.even[centre - own.past..].iter();
-            own.weights.iter().zip(rows).map(|(w, row)| w * row.driven[joint]).sum()
+            own.weights
+                .iter()
+                .zip(rows)
+                .map(|(w, row)| w * row.driven[joint])
+                .sum()
         });
         let qd = of_angles(&self.kernel.slope);
         let directions = qd.iter().zip(&self.widths);

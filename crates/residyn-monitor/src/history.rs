@@ -67,7 +67,8 @@ impl History {
 
     /// Windows that are tested in an hour, at most.
     pub fn windows_per_hour(block_s: f64) -> f64 {
-        let of_level = |level: usize| (EACH + 1) as f64 / 2_f64.powi(i32::try_from(level).unwrap_or(0));
+        let of_level =
+            |level: usize| (EACH + 1) as f64 / 2_f64.powi(i32::try_from(level).unwrap_or(0));
         3600.0 / block_s * (0..LEVELS).map(of_level).sum::<f64>()
     }
 }

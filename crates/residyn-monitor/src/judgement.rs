@@ -100,13 +100,17 @@ impl Judge<'_> {
             .map(|h| self.of_hypothesis(window, h))
             .collect();
         let probes: Vec<f64> = (0..self.baseline.probes.len())
-            .map(|joint| self.of_probes(window, joint, &window.score, self.thresholds.probes[joint]))
+            .map(|joint| {
+                self.of_probes(window, joint, &window.score, self.thresholds.probes[joint])
+            })
             .collect();
         let both = [
             (&hypotheses, &self.thresholds.hypotheses),
             (&probes, &self.thresholds.probes),
         ];
-        let ratios = both.iter().flat_map(|(own, limits)| own.iter().zip(*limits));
+        let ratios = both
+            .iter()
+            .flat_map(|(own, limits)| own.iter().zip(*limits));
         let ratio = ratios.map(|(own, limit)| own / limit).fold(0.0, f64::max);
         Evidence {
             window: window.clone(),
@@ -142,7 +146,9 @@ impl Judge<'_> {
     fn variance(&self, window: &Sums, h: usize) -> f64 {
         let row = window.information.column(h);
         let of_baseline = row.dot(&(&self.baseline.covariance * row));
-        self.baseline.hypotheses[h].variance * (window.information[(h, h)] + of_baseline)
+        let own = &self.baseline.hypotheses[h];
+        let information = window.information[(h, h)];
+        own.variance * (information + of_baseline) + own.misfit * information * information
     }
 
     /// By how much a hypothesis has changed in a window, and the half width of the 95 % interval.
@@ -150,14 +156,18 @@ impl Judge<'_> {
         let information = window.information[(h, h)];
         let freedom = self.baseline.hypotheses[h].freedom;
         let quantile = tails::t_squared(0.05, freedom).sqrt();
-        [window.score[h] / information, quantile * self.variance(window, h).sqrt() / information]
+        [
+            window.score[h] / information,
+            quantile * self.variance(window, h).sqrt() / information,
+        ]
     }
 
     /// The smallest change that is seen in such a window nine times in ten; `None` if no plausible one is.
     pub fn limit(&self, window: &Sums, h: usize) -> Option<f64> {
         let information = window.information[(h, h)];
         let threshold = self.thresholds.hypotheses[h];
-        let limit = (threshold.sqrt() + NINE_IN_TEN) * self.variance(window, h).sqrt() / information;
+        let limit =
+            (threshold.sqrt() + NINE_IN_TEN) * self.variance(window, h).sqrt() / information;
         (limit < self.hypotheses[h].plausible()).then_some(limit)
     }
 
@@ -182,11 +192,17 @@ impl Judge<'_> {
         let rows = window.information.columns(first, count);
         let of_baseline = rows.transpose() * &self.baseline.covariance * rows;
         let of_baseline = &own.to_independent * of_baseline * own.to_independent.transpose();
-        squared_length(&(scatter + &own.root * of_baseline * &own.root), &score)
+        let of_model = &information * &information * own.misfit;
+        let all = scatter + &own.root * of_baseline * &own.root + of_model;
+        squared_length(&all, &score)
     }
 
     /// What explains a window.
-    pub fn verdict(&self, evidence: &Evidence, is_admissible: impl Fn(usize, f64) -> bool) -> Verdict {
+    pub fn verdict(
+        &self,
+        evidence: &Evidence,
+        is_admissible: impl Fn(usize, f64) -> bool,
+    ) -> Verdict {
         let window = &evidence.window;
         let most = evidence.probes.iter().copied().fold(0.0, f64::max);
         let explains = |h: usize| {
@@ -199,7 +215,9 @@ impl Judge<'_> {
             })
         };
         let mut ranked: Vec<usize> = (0..self.hypotheses.len())
-            .filter(|h| evidence.hypotheses[*h] > 0.0 && is_admissible(*h, self.change(window, *h)[0]))
+            .filter(|h| {
+                evidence.hypotheses[*h] > 0.0 && is_admissible(*h, self.change(window, *h)[0])
+            })
             .collect();
         // The residual that each takes away, on one scale for all: their own scatters would favour some.
         let gain = |h: usize| window.score[h].powi(2) / window.information[(h, h)];
@@ -211,7 +229,8 @@ impl Judge<'_> {
         });
         ranked.retain(|h| gain(*h) >= least);
         ranked.retain(|h| explains(*h));
-        let has_crossed = |h: &usize| evidence.hypotheses[*h] >= 0.5 * self.thresholds.hypotheses[*h];
+        let has_crossed =
+            |h: &usize| evidence.hypotheses[*h] >= 0.5 * self.thresholds.hypotheses[*h];
         if ranked.iter().any(has_crossed) {
             return Verdict::Named(ranked);
         }

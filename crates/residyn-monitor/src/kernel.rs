@@ -61,7 +61,9 @@ impl Kernel {
     /// The same window for rows that act `delay_s` after their time, through a lag of `lag_s`.
     pub fn delayed(&self, delay_s: f64, lag_s: f64) -> Delayed {
         let parts: Vec<f64> = match lag_s > 0.0 {
-            true => (0..LAG_PARTS).map(|part| delay_s + lag_s * quantile(part)).collect(),
+            true => (0..LAG_PARTS)
+                .map(|part| delay_s + lag_s * quantile(part))
+                .collect(),
             false => vec![delay_s],
         };
         let latest = parts.iter().copied().fold(0.0, f64::max);
@@ -83,7 +85,11 @@ impl Kernel {
 
     /// Standard deviation of the slope per standard deviation of white noise on the rows, 1/s.
     pub fn slope_noise(&self) -> f64 {
-        self.slope.iter().map(|weight| weight * weight).sum::<f64>().sqrt()
+        self.slope
+            .iter()
+            .map(|weight| weight * weight)
+            .sum::<f64>()
+            .sqrt()
     }
 }
 
@@ -125,7 +131,11 @@ mod tests {
     fn applied(weights: &[f64], of: impl Fn(f64) -> f64, step_s: f64) -> f64 {
         let half = weights.len() / 2;
         let at = |row: usize| (row as f64 - half as f64) * step_s;
-        weights.iter().enumerate().map(|(row, w)| w * of(at(row))).sum()
+        weights
+            .iter()
+            .enumerate()
+            .map(|(row, w)| w * of(at(row)))
+            .sum()
     }
 
     #[test]
@@ -156,7 +166,10 @@ mod tests {
             let at = |row: usize| (row as f64 - delayed.past as f64) * 0.01;
             let weights = delayed.weights.iter().enumerate();
             let mean: f64 = weights.map(|(row, w)| w * at(row)).sum();
-            assert!((mean + delay_s + lag_s).abs() < 0.002, "{mean} {delay_s} {lag_s}");
+            assert!(
+                (mean + delay_s + lag_s).abs() < 0.002,
+                "{mean} {delay_s} {lag_s}"
+            );
         }
     }
 }

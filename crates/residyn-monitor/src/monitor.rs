@@ -12,9 +12,7 @@ use super::hypothesis::Hypothesis;
 use super::judgement::{Judge, Thresholds, Verdict};
 use super::kernel::Kernel;
 use super::rows::{Expected, Seen};
-use super::{
-    Alarm, DetectionLimit, Estimate, Kind, MonitorError, Named, Rows, Settings, Summary,
-};
+use super::{Alarm, DetectionLimit, Estimate, Kind, MonitorError, Named, Rows, Settings, Summary};
 
 /// Rows from which step and noise are taken before anything else.
 const FIRST_ROWS: usize = 256;
@@ -30,7 +28,7 @@ const RESTING_WIDTHS: f64 = 2.0;
 /// Blocks that an alarm waits for what explains it, at least and at most: as long as the change was there before it was seen.
 const WAIT_BLOCKS: [usize; 2] = [8, 30];
 /// Blocks after an alarm from which the new state is learnt before the watch goes on.
-const SETTLING_BLOCKS: usize = 30;
+const SETTLING_BLOCKS: usize = 60;
 /// What was told is told again when it has grown by this share.
 const GROWN: f64 = 0.5;
 /// Something unexplained on one joint is told again after this time, s.
@@ -138,7 +136,9 @@ impl Monitor {
             grid: None,
             samples: Vec::new(),
             usual: Usual::default(),
-            averages: Averages { of_joint: Vec::new() },
+            averages: Averages {
+                of_joint: Vec::new(),
+            },
             healthy: Vec::new(),
             watch: None,
         })
@@ -187,12 +187,20 @@ impl Monitor {
 
     /// Step, noise and smoothing from the first rows.
     fn begin(&mut self, rows: &[Row]) -> Grid {
-        let steps: Vec<f64> = rows.windows(2).map(|pair| pair[1].time - pair[0].time).collect();
+        let steps: Vec<f64> = rows
+            .windows(2)
+            .map(|pair| pair[1].time - pair[0].time)
+            .collect();
         let step_s = median(&steps);
         let usual = WIDE * (LIGHT_STEPS * step_s).max(LIGHT_S);
         let wide_s = self.settings.smoothing_s.unwrap_or(usual);
         let kernel = Kernel::new(wide_s / WIDE, step_s);
-        let Watched { dynamics, torque, widths, dry } = &self.compiled;
+        let Watched {
+            dynamics,
+            torque,
+            widths,
+            dry,
+        } = &self.compiled;
         let angle = |joint: usize| rows.iter().map(move |row| row.q[joint]);
         let resting = |joint: usize| {
             let angles: Vec<f64> = angle(joint).collect();
@@ -202,7 +210,10 @@ impl Monitor {
         };
         let joints = 0..self.expected.joints;
         self.usual = Usual {
-            origins: joints.clone().map(|joint| angle(joint).sum::<f64>() / rows.len() as f64).collect(),
+            origins: joints
+                .clone()
+                .map(|joint| angle(joint).sum::<f64>() / rows.len() as f64)
+                .collect(),
             resting: joints.clone().map(resting).collect(),
         };
         let acts_after = match torque {
@@ -214,7 +225,8 @@ impl Monitor {
         let delayed = joints.map(|joint| {
             let own = |kind: CommandFilter| -> f64 {
                 let filters = dynamics.filters.iter();
-                let own = filters.filter(|filter| filter.joint.index() == joint && filter.kind == kind);
+                let own =
+                    filters.filter(|filter| filter.joint.index() == joint && filter.kind == kind);
                 own.map(|filter| values[filter.parameter]).sum()
             };
             let delay_s = acts_after + own(CommandFilter::Delay);
@@ -229,13 +241,22 @@ impl Monitor {
 
     /// The blocks that the newest samples complete.
     fn complete(&mut self, alarms: &mut Vec<Alarm>) -> Result<(), MonitorError> {
-        let Some(grid) = &self.grid else { return Ok(()) };
+        let Some(grid) = &self.grid else {
+            return Ok(());
+        };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive, and small
-        let wanted = (self.settings.block_s / grid.sample_step_s()).round().max(2.0) as usize;
+        let wanted = (self.settings.block_s / grid.sample_step_s())
+            .round()
+            .max(2.0) as usize;
         while self.samples.len() >= wanted {
             let rest = self.samples.split_off(wanted);
             let samples = std::mem::replace(&mut self.samples, rest);
-            let block = Block::of(&samples, &mut self.equations, &self.columns, (&self.usual, &mut self.averages));
+            let block = Block::of(
+                &samples,
+                &mut self.equations,
+                &self.columns,
+                (&self.usual, &mut self.averages),
+            );
             if !block.is_finite() {
                 return Err(MonitorError::Healthy {
                     time: block.end_s,
@@ -254,7 +275,8 @@ impl Monitor {
     fn learn(&mut self, block: Block) -> Result<(), MonitorError> {
         let time = block.end_s;
         self.healthy.push(block);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked to be at least 20
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // checked to be at least 20
         let wanted = (self.settings.healthy_s / self.settings.block_s) as usize;
         if self.healthy.len() < wanted {
             return Ok(());
@@ -263,7 +285,8 @@ impl Monitor {
         let baseline = Baseline::of(&blocks, &self.columns, &self.hypotheses);
         let baseline = baseline.ok_or_else(|| MonitorError::Healthy {
             time,
-            fault: "none of them moves; begin with the motion that the machine makes at work".to_owned(),
+            fault: "none of them moves; begin with the motion that the machine makes at work"
+                .to_owned(),
         })?;
         if let Some(grid) = &mut self.grid {
             grid.is_healthy = false;
@@ -335,7 +358,10 @@ impl Monitor {
         let verdict = judge.verdict(&evidence, is_admissible);
         let time_s = block.end_s;
         let changes: Vec<(usize, [f64; 2])> = match &verdict {
-            Verdict::Named(of) => of.iter().map(|h| (*h, judge.change(&evidence.window, *h))).collect(),
+            Verdict::Named(of) => of
+                .iter()
+                .map(|h| (*h, judge.change(&evidence.window, *h)))
+                .collect(),
             Verdict::Unexplained(_) => Vec::new(),
         };
         let alarm = watch.told(&verdict, &changes, &evidence.window, time_s);
@@ -345,16 +371,24 @@ impl Monitor {
             is_further,
             causes: causes(&verdict, &changes, hypotheses, &self.labels, &watch.changed),
         });
-        watch.baseline.absorb(&columns.free_with(&verdict), &evidence.window);
+        watch
+            .baseline
+            .absorb(&columns.free_with(&verdict), &evidence.window);
         watch.history.clear();
-        watch.settling = Some(Settling { verdict, window: None });
+        watch.settling = Some(Settling {
+            verdict,
+            window: None,
+        });
         watch.alarms.extend(alarm.clone());
         alarm
     }
 
     /// What was seen so far, and how small a change would have been seen.
     pub fn summary(&self) -> Summary {
-        let irregular = self.grid.as_ref().map_or_else(Irregular::default, |grid| grid.irregular);
+        let irregular = self
+            .grid
+            .as_ref()
+            .map_or_else(Irregular::default, |grid| grid.irregular);
         let watch = self.watch.as_ref();
         let total = watch.and_then(|watch| watch.total.as_ref());
         let watched_s = total.map_or(0.0, |total| total.blocks as f64 * self.settings.block_s);
@@ -407,7 +441,9 @@ impl Watch {
     /// One more block of the stretch after an alarm. At its end the new state is the baseline, and what was named is known
     /// better.
     fn settle(&mut self, block: Sums, columns: &Columns) {
-        let Some(settling) = &mut self.settling else { return };
+        let Some(settling) = &mut self.settling else {
+            return;
+        };
         let window = match &mut settling.window {
             Some(window) => {
                 window.add(&block);
@@ -422,9 +458,14 @@ impl Watch {
             && let Some(change) = of.first().and_then(|h| self.changed[*h].as_mut())
         {
             let information = window.information[(of[0], of[0])];
-            change.value += if information > 0.0 { window.score[of[0]] / information } else { 0.0 };
+            change.value += if information > 0.0 {
+                window.score[of[0]] / information
+            } else {
+                0.0
+            };
         }
-        self.baseline.absorb(&columns.free_with(&settling.verdict), window);
+        self.baseline
+            .absorb(&columns.free_with(&settling.verdict), window);
         self.settling = None;
     }
 
@@ -451,7 +492,9 @@ impl Watch {
                 let value = value + before.as_ref().map_or(0.0, |before| before.value);
                 let told = before.as_ref().map_or(0.0, |before| before.told);
                 let is_told = before.is_none() || (value - told).abs() >= GROWN * told.abs();
-                let since_s = before.as_ref().map_or(window.start_s, |before| before.since_s);
+                let since_s = before
+                    .as_ref()
+                    .map_or(window.start_s, |before| before.since_s);
                 self.changed[*h] = Some(Change {
                     value,
                     half_width: *half_width,
@@ -505,7 +548,11 @@ fn causes(
 impl Hypothesis {
     /// A change of one, as estimates give it.
     fn unit_of_estimates(&self) -> f64 {
-        if self.is_relative() { self.value.abs() } else { 1.0 }
+        if self.is_relative() {
+            self.value.abs()
+        } else {
+            1.0
+        }
     }
 
     fn estimate(&self, value: f64, half_width: f64) -> Estimate {
@@ -522,7 +569,9 @@ impl Hypothesis {
 /// Standard deviation of white noise on angles, by third differences, which no motion reaches at these steps: their median,
 /// times what a normal distribution has in its place.
 fn noise(angles: &[f64]) -> f64 {
-    let third = angles.windows(4).map(|four| (four[3] - 3.0 * (four[2] - four[1]) - four[0]).abs());
+    let third = angles
+        .windows(4)
+        .map(|four| (four[3] - 3.0 * (four[2] - four[1]) - four[0]).abs());
     let third: Vec<f64> = third.collect();
     median(&third) / 0.6745 / 20.0_f64.sqrt()
 }

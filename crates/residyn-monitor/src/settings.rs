@@ -44,7 +44,11 @@ impl Settings {
         };
         if !(self.false_alarms_per_hour > 0.0 && self.false_alarms_per_hour <= 60.0) {
             let wanted = "give more than 0 and at most 60 false alarms per hour";
-            return wrong("the rate of false alarms", self.false_alarms_per_hour, wanted);
+            return wrong(
+                "the rate of false alarms",
+                self.false_alarms_per_hour,
+                wanted,
+            );
         }
         if !(self.block_s > 0.0 && self.block_s <= 600.0) {
             let wanted = "give more than 0 and at most 600 s";

@@ -45,16 +45,34 @@ pub struct Summary {
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { rows, watched_s, gaps, jumps, repeated_rows, .. } = self;
-        writeln!(f, "{rows} rows, {watched_s:.0} s watched, {} alarm(s)", self.alarms.len())?;
+        let Self {
+            rows,
+            watched_s,
+            gaps,
+            jumps,
+            repeated_rows,
+            ..
+        } = self;
+        writeln!(
+            f,
+            "{rows} rows, {watched_s:.0} s watched, {} alarm(s)",
+            self.alarms.len()
+        )?;
         if !self.is_calibrated {
             return writeln!(f, "the healthy stretch has not ended: nothing was watched");
         }
         if gaps + jumps + repeated_rows > 0 {
-            writeln!(f, "{gaps} gap(s), {jumps} jump(s) of an angle, {repeated_rows} row(s) that repeat the angles")?;
+            writeln!(
+                f,
+                "{gaps} gap(s), {jumps} jump(s) of an angle, {repeated_rows} row(s) that repeat the angles"
+            )?;
         }
         if self.disturbances > 0 {
-            writeln!(f, "{} short disturbance(s), over before they could be explained", self.disturbances)?;
+            writeln!(
+                f,
+                "{} short disturbance(s), over before they could be explained",
+                self.disturbances
+            )?;
         }
         for limit in &self.limits {
             writeln!(f, "{limit}")?;
@@ -65,10 +83,16 @@ impl fmt::Display for Summary {
 
 impl fmt::Display for DetectionLimit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, joint, unit, .. } = self;
+        let Self {
+            name, joint, unit, ..
+        } = self;
         write!(f, "{name} of joint {joint}: ")?;
         match self.within_an_hour {
-            Some(limit) if self.is_relative => write!(f, "a change by {:.1} % is seen within an hour", 100.0 * limit)?,
+            Some(limit) if self.is_relative => write!(
+                f,
+                "a change by {:.1} % is seen within an hour",
+                100.0 * limit
+            )?,
             Some(limit) => write!(f, "a change by {limit:.2e} {unit} is seen within an hour")?,
             None => write!(f, "the motion does not show it")?,
         }

@@ -31,14 +31,32 @@ fn friction_that_grew_is_named_with_its_joint_size_and_time() {
     let alarms = alarms(&healthy, &worn);
     let alarm = &alarms[0];
     let cause = alarm.cause();
-    assert_eq!((cause.kind, cause.joint, cause.name.as_str()), (Kind::Parameter, Joint::at(1), "F_c2"), "{alarm}");
+    assert_eq!(
+        (cause.kind, cause.joint, cause.name.as_str()),
+        (Kind::Parameter, Joint::at(1), "F_c2"),
+        "{alarm}"
+    );
     let estimate = cause.estimate.as_ref().unwrap();
     let [low, high] = estimate.ci95;
-    assert!(estimate.is_relative && low < 0.3 && 0.3 < high && high - low < 0.1, "{alarm}");
-    assert!((alarm.since_s - 121.0).abs() < 5.0 && alarm.time_s < 140.0, "{alarm:?}");
+    assert!(
+        estimate.is_relative && low < 0.3 && 0.3 < high && high - low < 0.1,
+        "{alarm}"
+    );
+    assert!(
+        (alarm.since_s - 121.0).abs() < 5.0 && alarm.time_s < 140.0,
+        "{alarm:?}"
+    );
     let told: serde_json::Value = serde_json::to_value(alarm).unwrap();
-    assert_eq!((&told["joint"], &told["kind"]), (&2.into(), &"parameter".into()));
-    assert!(told["message"].as_str().unwrap().starts_with("coulomb friction of joint 2"));
+    assert_eq!(
+        (&told["joint"], &told["kind"]),
+        (&2.into(), &"parameter".into())
+    );
+    assert!(
+        told["message"]
+            .as_str()
+            .unwrap()
+            .starts_with("coulomb friction of joint 2")
+    );
 }
 
 #[test]
@@ -49,7 +67,14 @@ fn what_the_motion_does_not_show_has_no_limit() {
     still.excitation.amplitude[1] = 0.0;
     monitor.update(&piece(&still, 0.0, 100.0, 1)).unwrap();
     let summary = monitor.summary();
-    let limit = |name: &str| summary.limits.iter().find(|limit| limit.name == name).unwrap().within_an_hour;
+    let limit = |name: &str| {
+        summary
+            .limits
+            .iter()
+            .find(|limit| limit.name == name)
+            .unwrap()
+            .within_an_hour
+    };
     assert!(limit("F_c1").is_some_and(|limit| limit < 0.2));
     assert_eq!(limit("F_c2"), None, "joint 2 hardly moves");
 }
@@ -87,11 +112,26 @@ fn rows_that_cannot_be_read_are_refused_with_row_and_column() {
         monitor.update(&rows).unwrap_err().to_string()
     };
     let cases: [(&dyn Fn(&mut Rows), &str); 5] = [
-        (&|rows| rows.q[0][4] = f64::NAN, "row 206, column \"q1\": NaN is not a number"),
-        (&|rows| rows.driven[0][0] = f64::INFINITY, "row 202, column \"tau1\": inf is not a number"),
-        (&|rows| rows.time[2] = rows.time[1], "row 204, column \"time\": 3.01 s does not come after 3.01 s"),
-        (&|rows| rows.q.push(Vec::new()), "2 column(s) of angles for 1 joint(s)"),
-        (&|rows| rows.q[0].truncate(7), "row 209: column \"q1\" ends at row 7"),
+        (
+            &|rows| rows.q[0][4] = f64::NAN,
+            "row 206, column \"q1\": NaN is not a number",
+        ),
+        (
+            &|rows| rows.driven[0][0] = f64::INFINITY,
+            "row 202, column \"tau1\": inf is not a number",
+        ),
+        (
+            &|rows| rows.time[2] = rows.time[1],
+            "row 204, column \"time\": 3.01 s does not come after 3.01 s",
+        ),
+        (
+            &|rows| rows.q.push(Vec::new()),
+            "2 column(s) of angles for 1 joint(s)",
+        ),
+        (
+            &|rows| rows.q[0].truncate(7),
+            "row 209: column \"q1\" ends at row 7",
+        ),
     ];
     for (spoil, words) in cases {
         let message = said(spoil);
@@ -109,7 +149,10 @@ fn gaps_jumps_and_repeated_rows_are_counted() {
     monitor.update(&rows).unwrap();
     monitor.update(&piece(&plant, 101.0, 5.0, 6)).unwrap();
     let summary = monitor.summary();
-    assert_eq!((summary.gaps, summary.jumps, summary.repeated_rows), (1, 1, 1));
+    assert_eq!(
+        (summary.gaps, summary.jumps, summary.repeated_rows),
+        (1, 1, 1)
+    );
 }
 
 #[test]
@@ -120,10 +163,20 @@ fn settings_and_models_that_cannot_be_watched_are_refused() {
         ..Settings::default()
     };
     let refused = Monitor::new(&declared, settings).err().unwrap();
-    assert!(refused.to_string().contains("the healthy stretch is 5"), "{refused}");
+    assert!(
+        refused.to_string().contains("the healthy stretch is 5"),
+        "{refused}"
+    );
     let text = "[system]\nname = \"wheel\"\njoints = 1\n[parameters]\nJ = { value = 1.0, fixed = true }\n\
         [dynamics]\nmass = [[\"J\"]]\nbias = [\"0\"]\n";
-    let bare = Library::built_in().model_from_text("wheel.toml", text).unwrap();
+    let bare = Library::built_in()
+        .model_from_text("wheel.toml", text)
+        .unwrap();
     let refused = Monitor::new(&bare, Settings::default()).err();
-    assert_eq!(refused, Some(MonitorError::NothingFree { model: "wheel".to_owned() }));
+    assert_eq!(
+        refused,
+        Some(MonitorError::NothingFree {
+            model: "wheel".to_owned()
+        })
+    );
 }

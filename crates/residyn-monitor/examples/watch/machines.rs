@@ -1,12 +1,12 @@
 //! Simulated machines: pieces of a log, each with its own state of wear, one after the other.
 
+use crate::Rows;
 use nalgebra::{Matrix3, Vector3};
 use residyn_core::data::{Joint, Log};
 use residyn_core::model::tree::{Drivetrain, Inertia, Pose, Servo, Tree, model_text, turn};
 use residyn_core::model::{Library, Model};
 use residyn_core::plant::{Excitation, Plant};
 use residyn_core::rng;
-use crate::Rows;
 
 /// Rows per second.
 pub const RATE_HZ: f64 = 100.0;
@@ -30,7 +30,10 @@ pub fn arm() -> Plant {
              [[effect]]\nname = \"coulomb_friction\"\njoint = {joint}\nF_c = {level}\n"
         )
     };
-    let declared = Library::built_in().model("acrobot").expect("a built-in system").text;
+    let declared = Library::built_in()
+        .model("acrobot")
+        .expect("a built-in system")
+        .text;
     let text = declared + &friction(1, 1.5, 1.0) + &friction(2, 0.8, 0.6);
     plant("arm.toml", &text, vec![9.0, 4.0])
 }
@@ -51,7 +54,11 @@ pub fn servo_arm(joints: usize) -> Plant {
                     0 => turn(Vector3::x(), std::f64::consts::FRAC_PI_2),
                     _ => turn(Vector3::x(), std::f64::consts::PI * across),
                 },
-                origin: if k == 0 { Vector3::zeros() } else { Vector3::new(length, 0.0, 0.0) },
+                origin: if k == 0 {
+                    Vector3::zeros()
+                } else {
+                    Vector3::new(length, 0.0, 0.0)
+                },
             },
             reference: 0.0,
             across: Vector3::x(),
@@ -103,7 +110,12 @@ fn plant(name: &str, text: &str, amplitude: Vec<f64>) -> Plant {
 }
 
 /// The plant with another value of an effect's first parameter.
-pub fn with_effect(mut plant: Plant, name: &str, joint: usize, change: impl Fn(f64) -> f64) -> Plant {
+pub fn with_effect(
+    mut plant: Plant,
+    name: &str,
+    joint: usize,
+    change: impl Fn(f64) -> f64,
+) -> Plant {
     let mut effects = plant.effects.iter_mut();
     let effect = effects.find(|own| own.effect.name == name && own.joint == Joint::at(joint));
     let value = &mut effect.expect("the plant has it").values[0].0;
@@ -113,7 +125,10 @@ pub fn with_effect(mut plant: Plant, name: &str, joint: usize, change: impl Fn(f
 
 /// The plant with one more effect.
 pub fn adding(mut plant: Plant, name: &str, joint: usize, values: &[(&str, f64)]) -> Plant {
-    let values: Vec<(String, f64)> = values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+    let values: Vec<(String, f64)> = values
+        .iter()
+        .map(|(name, value)| ((*name).to_owned(), *value))
+        .collect();
     let added = plant.add_effect(&Library::built_in(), name, Joint::at(joint), &values);
     added.expect("the plant can have it");
     plant

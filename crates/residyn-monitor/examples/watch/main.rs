@@ -15,7 +15,11 @@ const PAUSE_S: f64 = 1.0;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let number = |at: usize, usual: f64| arguments.get(at).map_or(usual, |text| text.parse().expect("a number"));
+    let number = |at: usize, usual: f64| {
+        arguments
+            .get(at)
+            .map_or(usual, |text| text.parse().expect("a number"))
+    };
     let scenario = arguments.first().map_or("joint", String::as_str);
     let (first, seeds) = (number(1, 1.0) as u64, number(2, 1.0) as u64);
     let hours = number(3, 0.5);
@@ -25,7 +29,10 @@ fn main() {
     let started = Instant::now();
     for seed in first..first + seeds {
         let (model, at) = scene(scenario);
-        let settings = Settings { healthy_s: number(4, Settings::default().healthy_s), ..Settings::default() };
+        let settings = Settings {
+            healthy_s: number(4, Settings::default().healthy_s),
+            ..Settings::default()
+        };
         let mut monitor = Monitor::new(&model, settings).expect("a monitor");
         let mut time = 0.0;
         let mut part = 0;
@@ -46,7 +53,10 @@ fn main() {
         }
     }
     let watched = hours * seeds as f64;
-    println!("{scenario}: {alarms} alarms, {told} followed, {disturbances} disturbances, in {watched:.1} h of {seeds} machine(s), {:.0} s", started.elapsed().as_secs_f64());
+    println!(
+        "{scenario}: {alarms} alarms, {told} followed, {disturbances} disturbances, in {watched:.1} h of {seeds} machine(s), {:.0} s",
+        started.elapsed().as_secs_f64()
+    );
     if scenario == "speed" {
         speed();
     }
@@ -58,25 +68,56 @@ type At = Box<dyn Fn(f64) -> Plant>;
 fn scene(name: &str) -> (residyn_core::model::Model, At) {
     let after = |healthy: Plant, changed: Plant| -> (residyn_core::model::Model, At) {
         let model = model(&healthy);
-        (model, Box::new(move |time: f64| if time < 600.0 { healthy.clone() } else { changed.clone() }))
+        (
+            model,
+            Box::new(move |time: f64| {
+                if time < 600.0 {
+                    healthy.clone()
+                } else {
+                    changed.clone()
+                }
+            }),
+        )
     };
     let ease = |healthy: Plant| after(healthy.clone(), healthy);
     match name {
         "joint" => ease(joint()),
         "arm" => ease(arm()),
         "servo_arm" => ease(servo_arm(2)),
-        "arm_friction" => after(arm(), with_effect(arm(), "coulomb_friction", 1, |level| 1.3 * level)),
-        "servo_friction" => after(servo_arm(2), with_effect(servo_arm(2), "coulomb_friction", 1, |level| 1.3 * level)),
-        "payload" => after(servo_arm(2), adding(servo_arm(2), "payload", 1, &[("m", 0.8), ("x", 0.15), ("y", 0.0), ("z", 0.0)])),
+        "arm_friction" => after(
+            arm(),
+            with_effect(arm(), "coulomb_friction", 1, |level| 1.3 * level),
+        ),
+        "servo_friction" => after(
+            servo_arm(2),
+            with_effect(servo_arm(2), "coulomb_friction", 1, |level| 1.3 * level),
+        ),
+        "payload" => after(
+            servo_arm(2),
+            adding(
+                servo_arm(2),
+                "payload",
+                1,
+                &[("m", 0.8), ("x", 0.15), ("y", 0.0), ("z", 0.0)],
+            ),
+        ),
         "zero" => after(arm(), adding(arm(), "sensor_offset", 0, &[("q_z", 0.02)])),
-        "servo_zero" => after(servo_arm(2), adding(servo_arm(2), "sensor_offset", 0, &[("q_z", 0.02)])),
-        "spring" => after(arm(), adding(arm(), "joint_spring", 1, &[("k", 0.5), ("q_0", 0.3)])),
+        "servo_zero" => after(
+            servo_arm(2),
+            adding(servo_arm(2), "sensor_offset", 0, &[("q_z", 0.02)]),
+        ),
+        "spring" => after(
+            arm(),
+            adding(arm(), "joint_spring", 1, &[("k", 0.5), ("q_0", 0.3)]),
+        ),
         "wear" => {
             let healthy = arm();
             let model = model(&healthy);
             let worn = move |time: f64| {
                 let share = ((time - 600.0) / 1800.0).clamp(0.0, 1.0);
-                with_effect(arm(), "coulomb_friction", 1, |level| level * (1.0 + 0.3 * share))
+                with_effect(arm(), "coulomb_friction", 1, |level| {
+                    level * (1.0 + 0.3 * share)
+                })
             };
             (model, Box::new(worn))
         }
@@ -88,15 +129,27 @@ fn scene(name: &str) -> (residyn_core::model::Model, At) {
 fn speed() {
     let plant = servo_arm(7);
     let rows = piece(&plant, 0.0, 60.0, 1);
-    let mut monitor = Monitor::new(&model(&plant), Settings { healthy_s: 30.0, ..Settings::default() }).expect("a monitor");
+    let mut monitor = Monitor::new(
+        &model(&plant),
+        Settings {
+            healthy_s: 30.0,
+            ..Settings::default()
+        },
+    )
+    .expect("a monitor");
     let mut count = 0;
     let started = Instant::now();
     for round in 0..20 {
         let mut rows = rows.clone();
-        rows.time.iter_mut().for_each(|time| *time += 61.0 * f64::from(round));
+        rows.time
+            .iter_mut()
+            .for_each(|time| *time += 61.0 * f64::from(round));
         count += rows.time.len();
         monitor.update(&rows).expect("good rows");
     }
     let taken_s = started.elapsed().as_secs_f64();
-    println!("{count} rows of seven joints at {RATE_HZ} Hz in {taken_s:.2} s: {:.0} rows/s", count as f64 / taken_s);
+    println!(
+        "{count} rows of seven joints at {RATE_HZ} Hz in {taken_s:.2} s: {:.0} rows/s",
+        count as f64 / taken_s
+    );
 }
