@@ -90,7 +90,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     }
     match arguments.common.json {
         true => line(&summary)?,
-        false => terminal::answer(format!("{} alarm(s)", summary.alarms.len()), &summary.to_string())?,
+        false => terminal::answer(
+            format!("{} alarm(s)", summary.alarms.len()),
+            &summary.to_string(),
+        )?,
     }
     Ok(Answer::of(summary.alarms.is_empty()))
 }
@@ -122,7 +125,8 @@ impl Lines {
         let reader: Box<dyn BufRead> = match path.as_os_str() == "-" {
             true => Box::new(BufReader::new(stdin())),
             false => {
-                let file = File::open(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+                let file = File::open(path)
+                    .with_context(|| format!("{}: cannot be read", path.display()))?;
                 Box::new(BufReader::new(file))
             }
         };
@@ -187,7 +191,9 @@ fn of_objects(model: &Model, lines: &[String]) -> Result<Log> {
         let numbers = object.iter().flat_map(|(name, value)| match value {
             Value::Array(of_joints) => {
                 let numbered = of_joints.iter().enumerate();
-                numbered.map(|(joint, value)| (format!("{name}{}", joint + 1), value)).collect()
+                numbered
+                    .map(|(joint, value)| (format!("{name}{}", joint + 1), value))
+                    .collect()
             }
             value => vec![(name.clone(), value)],
         });
@@ -197,7 +203,10 @@ fn of_objects(model: &Model, lines: &[String]) -> Result<Log> {
             match columns.iter_mut().find(|(own, _)| *own == name) {
                 Some((_, column)) => column.push(value),
                 None if at == 0 => columns.push((name, vec![value])),
-                None => bail!("line {} of these has `{name}`, which the first one lacks", at + 1),
+                None => bail!(
+                    "line {} of these has `{name}`, which the first one lacks",
+                    at + 1
+                ),
             }
         }
     }
@@ -206,13 +215,20 @@ fn of_objects(model: &Model, lines: &[String]) -> Result<Log> {
 
 /// Intervals of the declared parameters that the model file does not have.
 fn take_intervals(model: &mut Model, path: &Path) -> Result<()> {
-    let text = read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
-    let report: Value = serde_json::from_str(&text).with_context(|| format!("{}: is not a report", path.display()))?;
+    let text =
+        read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let report: Value = serde_json::from_str(&text)
+        .with_context(|| format!("{}: is not a report", path.display()))?;
     let Some(found) = report["parameters"].as_array() else {
-        bail!("{}: has no `parameters`; give the report.json of closeloop", path.display());
+        bail!(
+            "{}: has no `parameters`; give the report.json of closeloop",
+            path.display()
+        );
     };
     for parameter in &mut model.parameters {
-        let own = found.iter().find(|own| own["name"] == parameter.name.as_str());
+        let own = found
+            .iter()
+            .find(|own| own["name"] == parameter.name.as_str());
         let ends = own.map(|own| [0, 1].map(|end| own["ci95"][end].as_f64()));
         if let (None, Some([Some(low), Some(high)])) = (parameter.ci95, ends) {
             parameter.ci95 = Some([low, high]);

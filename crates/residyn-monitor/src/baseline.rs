@@ -279,7 +279,10 @@ fn scatter(blocks: &[[f64; 2]]) -> Scatter {
     // Two values, those of offset and scatter, come from the same blocks.
     let variance = square / information * count / (count - 2.0);
     let freedom = ((count - 2.0) / longer).max(3.0);
-    let draws: Vec<DVector<f64>> = scaled.iter().map(|draw| DVector::from_element(1, *draw)).collect();
+    let draws: Vec<DVector<f64>> = scaled
+        .iter()
+        .map(|draw| DVector::from_element(1, *draw))
+        .collect();
     let square = |draw: &DVector<f64>| draw[0] * draw[0] / variance;
     let heavier = heaviness(&draws, square, |p| tails::t_squared(p, freedom));
     Scatter {
@@ -312,7 +315,9 @@ fn heaviness(
         let windows = draws.chunks_exact(*length);
         let count = windows.len() as f64;
         let sum = |window: &[DVector<f64>]| -> f64 {
-            let sum = window.iter().fold(window[0].clone() * 0.0, |sum, draw| sum + draw);
+            let sum = window
+                .iter()
+                .fold(window[0].clone() * 0.0, |sum, draw| sum + draw);
             statistic(&(sum / (*length as f64).sqrt()))
         };
         match count >= LEAST_WINDOWS {

@@ -52,7 +52,7 @@ pub struct Monitor {
     usual: Usual,
     averages: Averages,
     healthy: Vec<Block>,
-    pub(crate) watch: Option<Watch>,
+    watch: Option<Watch>,
 }
 
 /// What the smoothing needs to know of the model.
@@ -64,8 +64,8 @@ struct Watched {
 }
 
 /// The state after the healthy stretch.
-pub(crate) struct Watch {
-    pub(crate) baseline: Baseline,
+struct Watch {
+    baseline: Baseline,
     thresholds: Thresholds,
     history: History,
     /// All blocks since then, as one: how much the motion shows.
