@@ -17,6 +17,7 @@ __all__ = [
     "Library",
     "Log",
     "Model",
+    "Monitor",
     "Outcome",
     "Parameter",
     "ResidynError",
@@ -487,6 +488,55 @@ class Episode:
     @property
     def success(self) -> bool:
         """Whether the goal of the task held to the end."""
+
+@final
+class Monitor:
+    """A watch on a running machine: its rows go in as they come, alarms come out.
+
+    Args:
+        model: fitted to the machine when it was well.
+        false_alarms_per_hour: over everything that is watched.
+        healthy_s: length of the first stretch, in which the machine is well, in s.
+        block_s: length of the blocks whose scores are taken as one draw, in s.
+        smoothing_s: half the width of the window over which forces are averaged, in s; by default 120 ms, or fifteen steps of
+            slower logs.
+        payload_at: where a load at the tip is expected in the frame of the last body, in m; by default its centre of mass.
+
+    Raises:
+        ResidynError: settings out of their range, or a model that cannot be watched.
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        *,
+        false_alarms_per_hour: float = 0.1,
+        healthy_s: float = 300.0,
+        block_s: float = 1.0,
+        smoothing_s: float | None = None,
+        payload_at: tuple[float, float, float] | None = None,
+    ) -> Monitor: ...
+    def update(self, rows: Log | dict[str, ArrayLike]) -> list[dict[str, Any]]:
+        """Take the next rows.
+
+        Args:
+            rows: a `Log`, or a dictionary of arrays: `time`, shape (rows,), `q` and `tau` or `cmd`, shape (rows, joints), and
+                the model's further measured columns by their names, shape (rows,).
+
+        Returns:
+            The alarms that they raise, each a dictionary with `time_s`, `since_s`, `kind`, `joint`, `name`, `estimate`, `or`,
+            `is_further` and `message`.
+
+        Raises:
+            ResidynError: rows out of order, numbers that are not finite, or columns that are missing.
+        """
+    def summary(self) -> dict[str, Any]:
+        """What was seen so far, and how small a change would have been seen within an hour.
+
+        Returns:
+            A dictionary with `rows`, `watched_s`, `is_calibrated`, `gaps`, `jumps`, `repeated_rows`, `alarms`, `followed`,
+            `disturbances` and `limits`.
+        """
 
 @final
 class Rig:

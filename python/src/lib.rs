@@ -7,6 +7,7 @@ mod error;
 mod library;
 mod log;
 mod model;
+mod monitor;
 mod rig;
 mod train;
 mod work;
@@ -31,6 +32,8 @@ mod _residyn {
     use crate::log::{Log, read_log};
     #[pymodule_export]
     use crate::model::{Model, Parameter};
+    #[pymodule_export]
+    use crate::monitor::Monitor;
     #[pymodule_export]
     use crate::rig::{Rig, simulate};
 

@@ -23,6 +23,7 @@ mod investigate;
 mod list;
 mod mbrl;
 mod merge;
+mod monitor;
 mod new;
 mod notes;
 mod progress;
@@ -78,6 +79,7 @@ enum Command {
     Excite(excite::Arguments),
     Investigate(investigate::Arguments),
     Control(control::Arguments),
+    Monitor(monitor::Arguments),
     Mbrl(mbrl::Arguments),
     Experiment(experiment::Arguments),
     Simulate(simulate::Arguments),
@@ -166,6 +168,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Excite(arguments) => excite::run(&arguments),
         Command::Investigate(arguments) => investigate::run(&arguments),
         Command::Control(arguments) => control::run(&arguments),
+        Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Mbrl(arguments) => mbrl::run(&arguments),
         Command::Experiment(arguments) => experiment::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
