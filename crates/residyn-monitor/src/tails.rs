@@ -5,8 +5,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 /// The square of a Student's t with these degrees of freedom is above it with probability `p`.
 pub(crate) fn t_squared(p: f64, freedom: f64) -> f64 {
     let t = StudentsT::new(0.0, 1.0, freedom).expect("degrees of freedom are positive");
-    let bound = crossing(|x| 2.0 * t.sf(x.sqrt()), p);
-    bound
+    crossing(|x| 2.0 * t.sf(x.sqrt()), p)
 }
 
 /// Hotelling's T squared of `k` variables, whose covariance comes from `blocks`, is above it with probability `p`.
