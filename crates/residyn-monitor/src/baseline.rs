@@ -1,7 +1,6 @@
 //! The healthy state: by how much the model is off already, and how far scores scatter while nothing changes.
 
 use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
-
 use residyn_core::decomposition::eigen;
 
 use super::block::{Block, Columns, JointSums, Sums};
@@ -250,7 +249,7 @@ fn inverted(information: &DMatrix<f64>) -> DMatrix<f64> {
             let SymmetricEigen {
                 eigenvalues,
                 eigenvectors,
-            } = decomposed(scaled);
+            } = eigen_of(scaled);
             let inverse = DMatrix::from_diagonal(&eigenvalues.map(|value| 1.0 / value.max(RIDGE)));
             &eigenvectors * inverse * eigenvectors.transpose()
         }
@@ -350,7 +349,7 @@ fn probes(each: &[Sums], left: &[Sums], places: std::ops::Range<usize>) -> Optio
     let SymmetricEigen {
         eigenvalues,
         eigenvectors,
-    } = decomposed(scaled);
+    } = eigen_of(scaled);
     let kept: Vec<usize> = (0..count)
         .filter(|k| eigenvalues[*k] > SAME_PROBE * count as f64)
         .collect();
@@ -367,7 +366,7 @@ fn probes(each: &[Sums], left: &[Sums], places: std::ops::Range<usize>) -> Optio
         let SymmetricEigen {
             eigenvalues,
             eigenvectors,
-        } = decomposed(scale);
+        } = eigen_of(scale);
         let inverse = eigenvalues.map(|value| {
             if value > 0.0 {
                 value.sqrt().recip()
@@ -407,12 +406,16 @@ pub(crate) fn spreading(information: &DMatrix<f64>) -> DMatrix<f64> {
     0.5 * (information + DMatrix::identity(count, count) * whole)
 }
 
+fn eigen_of(symmetric: DMatrix<f64>) -> SymmetricEigen<f64, Dyn> {
+    eigen(symmetric).expect("the sums of a block were found to be finite")
+}
+
 /// The symmetric root of a covariance.
 pub(crate) fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let SymmetricEigen {
         eigenvalues,
         eigenvectors,
-    } = decomposed(covariance.clone());
+    } = eigen_of(covariance.clone());
     let roots = DMatrix::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
     &eigenvectors * roots * eigenvectors.transpose()
 }

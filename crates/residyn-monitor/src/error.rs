@@ -43,6 +43,6 @@ pub enum MonitorError {
         "row {row}, column \"time\": {time} s does not come after {before} s; send rows in the order of their times"
     )]
     Order { row: usize, time: f64, before: f64 },
-    #[error("the healthy stretch up to {time} s says nothing about a joint: {fault}")]
+    #[error("up to {time} s: {fault}")]
     Healthy { time: f64, fault: String },
 }

@@ -285,7 +285,7 @@ impl Monitor {
         let baseline = Baseline::of(&blocks, &self.columns, &self.hypotheses);
         let baseline = baseline.ok_or_else(|| MonitorError::Healthy {
             time,
-            fault: "none of them moves; begin with the motion that the machine makes at work"
+            fault: "no joint moves in the healthy stretch; begin with the motion that the machine makes at work"
                 .to_owned(),
         })?;
         if let Some(grid) = &mut self.grid {

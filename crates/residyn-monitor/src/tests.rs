@@ -111,7 +111,8 @@ fn rows_that_cannot_be_read_are_refused_with_row_and_column() {
         spoil(&mut rows);
         monitor.update(&rows).unwrap_err().to_string()
     };
-    let cases: [(&dyn Fn(&mut Rows), &str); 5] = [
+    type Case<'c> = (&'c dyn Fn(&mut Rows), &'c str);
+    let cases: [Case<'_>; 5] = [
         (
             &|rows| rows.q[0][4] = f64::NAN,
             "row 206, column \"q1\": NaN is not a number",
