@@ -1,5 +1,5 @@
 use std::fs::{File, read_to_string};
-use std::io::{BufRead, BufReader, stdin};
+use std::io::{BufRead, BufReader, Read, stdin};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
@@ -112,41 +112,42 @@ fn line(value: &impl serde::Serialize) -> Result<()> {
 
 /// Lines of a log that may still grow.
 struct Lines {
-    reader: Box<dyn BufRead>,
+    reader: BufReader<Box<dyn Read>>,
     follows: bool,
     /// A line whose end has not come yet.
     begun: String,
-    /// A line that waits for a second one: a batch has at least two rows.
-    kept: Vec<String>,
 }
 
 impl Lines {
     fn open(path: &Path, follows: bool) -> Result<Self> {
-        let reader: Box<dyn BufRead> = match path.as_os_str() == "-" {
-            true => Box::new(BufReader::new(stdin())),
+        let reader: Box<dyn Read> = match path.as_os_str() == "-" {
+            true => Box::new(stdin()),
             false => {
                 let file = File::open(path)
                     .with_context(|| format!("{}: cannot be read", path.display()))?;
-                Box::new(BufReader::new(file))
+                Box::new(file)
             }
         };
         Ok(Self {
-            reader,
+            reader: BufReader::new(reader),
             follows,
             begun: String::new(),
-            kept: Vec::new(),
         })
     }
 
-    /// The next lines, at most `most` and at least three unless the log ends; `None` at its end.
+    /// The next lines, at most `most` and at least three unless the log ends: what is there is not kept waiting for more. `None`
+    /// at its end.
     fn next(&mut self, most: usize) -> Result<Option<Vec<String>>> {
-        let mut lines = std::mem::take(&mut self.kept);
+        let mut lines = Vec::new();
         while lines.len() < most {
             let count = self.reader.read_line(&mut self.begun)?;
             if self.begun.ends_with('\n') || count == 0 && !self.follows && !self.begun.is_empty() {
                 let whole = std::mem::take(&mut self.begun);
                 if !whole.trim().is_empty() {
                     lines.push(whole.trim_end().to_owned());
+                }
+                if lines.len() > 2 && self.reader.buffer().is_empty() {
+                    break;
                 }
                 continue;
             }

@@ -419,8 +419,3 @@ pub(crate) fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let roots = DMatrix::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
     &eigenvectors * roots * eigenvectors.transpose()
 }
-
-/// The eigenvalues and eigenvectors of a symmetric matrix of sums over rows, which are finite.
-fn decomposed(matrix: DMatrix<f64>) -> SymmetricEigen<f64, Dyn> {
-    eigen(matrix).expect("sums over finite rows are finite")
-}
