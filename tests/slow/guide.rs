@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::thread;
 
+use crate::support::clients::plants_in;
 use crate::support::measured;
 use crate::support::paths::ours;
 
@@ -50,7 +51,14 @@ fn run(commands: &str, folder: &Path) -> Result<Option<String>, String> {
         shell.env("RESIDYN_DATA", set.parent().unwrap());
     }
     let program = Path::new(env!("CARGO_BIN_EXE_residyn")).parent().unwrap();
-    let path = std::env::var("PATH").unwrap();
+    let mut path = std::env::var("PATH").unwrap();
+    if commands.contains("residyn.plants") {
+        let Some([(name, package), (_, programs)]) = plants_in(folder) else {
+            return Ok(None);
+        };
+        shell.env(name, package);
+        path = programs.into_string().unwrap();
+    }
     let output = shell
         .args(["-euo", "pipefail", "-c"])
         .arg(format!("exec 2>&1\n{commands}"))
@@ -148,7 +156,7 @@ fn is_alike(shown: &str, printed: &str) -> bool {
 fn every_command_prints_what_its_page_says() {
     let mut pages = markdown("docs/guide");
     pages.push(ours("docs/guide.md"));
-    assert!(pages.len() >= 11, "{pages:?}");
+    assert!(pages.len() >= 12, "{pages:?}");
     let failures: Vec<String> = thread::scope(|scope| {
         let runs: Vec<_> = pages
             .iter()
