@@ -24,7 +24,7 @@ fn a_motion_within_limits_is_written_with_what_it_will_tell() {
     let names: Vec<&str> = (intervals.iter())
         .map(|one| one["parts"][0][0].as_str().unwrap())
         .collect();
-    assert_eq!(names, ["C_g", "C_i"]);
+    assert_eq!(names, ["C_i", "C_g"]);
     assert!(
         intervals
             .iter()
@@ -45,8 +45,8 @@ fn limits_that_allow_no_motion_and_mistakes_in_them_are_told() {
     let scratch = Scratch::new();
     let line = "excite --model pendulum --limits limits.toml --duration 4 --out motion.csv";
     for [from, to, words] in rows(
-        "torque = 12.0 | torque = -1.0 | limits.toml:6:10 ... `torque` is -1; write a number above zero
-         speed = 4.0   | spede = 4.0   | limits.toml:4:1 ... spede
+        "torque = 12.0 | torque = -1.0 | limits.toml, line 6, column 10: `torque` is -1; write a number above zero
+         speed = 4.0   | spede = 4.0   | limits.toml, line 4 ... spede
          [-1.0, 1.0]   | [1.0, -1.0]   | `angle` is [1, -1]; write [least, greatest]",
     ) {
         scratch.file("limits.toml", LIMITS.replace(&from, &to));

@@ -76,8 +76,8 @@ mod tests {
 
     #[test]
     fn an_address_is_a_command_or_a_port_of_this_machine() {
-        let command = Address::Exec("python rig.py --rate 100".into());
-        assert_eq!(read("exec: python rig.py --rate 100"), Some(Ok(command)));
+        let command = Address::Exec("python rig.py -r 100".into());
+        assert_eq!(read("exec: python rig.py -r 100"), Some(Ok(command)));
         let port = Address::Tcp(([127, 0, 0, 1], 4000).into());
         assert_eq!(read("tcp:127.0.0.1:4000"), Some(Ok(port)));
         assert_eq!(read("pendulum-real"), None);
