@@ -44,6 +44,7 @@ mod mechanism;
 mod memory;
 mod metric;
 mod models;
+mod monitor;
 mod oracles;
 mod parameter_shift;
 mod parity;
