@@ -3,12 +3,13 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args;
+use indicatif::ProgressBar;
 use serde_json::{Value, json};
 
 use super::call::{Begun, files};
 use super::elsewhere::Elsewhere;
 use super::excite::read_limits;
-use super::{Answer, Common, inputs, interrupt, terminal};
+use super::{Answer, Common, inputs, interrupt, progress, terminal};
 use residyn_core::closeloop::Progress;
 use residyn_core::model::{Call, Model, Origin};
 use residyn_excite::Limits;
@@ -82,7 +83,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let plant = arguments.elsewhere.open(&arguments.plant, &library)?;
     let limits = limits(arguments, &model, &plant)?;
     let folder = RunFolder::open(&arguments.out)?;
-    folder.claim(&identity(arguments, &model)?)?;
+    let identity = identity(arguments, &model)?;
+    folder.claim(&identity)?;
     let path = folder.path().display().to_string();
     let _orderly = interrupt::orderly(&folder, move || {
         format!("{path} keeps all runs; the same command goes on")
@@ -101,9 +103,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         choose,
         seed: arguments.common.seed,
     };
-    let found = investigation.carry_out(&folder, &Told)?;
-    let config = identity(arguments, &model)?.config;
-    let value = value(&found, &config, arguments.common.seed);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few runs
+    let bar = progress::bar((arguments.motion / arguments.run) as usize);
+    let found = investigation.carry_out(&folder, &Told(&bar))?;
+    bar.finish_and_clear();
+    let value = value(&found, &identity.config, arguments.common.seed);
     let call = begun.call(&read);
     write(arguments, &folder, &model, &found, &value, &call)?;
     let text = text(&found, &model, arguments);
@@ -139,20 +143,28 @@ fn identity(arguments: &Arguments, model: &Model) -> Result<Identity> {
     })
 }
 
-/// Tells what is played and what was found, line by line.
-struct Told;
+/// Tells what is played and what was found, line by line, and counts the runs that were allowed.
+struct Told<'b>(&'b ProgressBar);
 
-impl Watch for Told {
+impl Watch for Told<'_> {
     fn plays(&self, run: usize, choice: &Choice) {
         let (purpose, duration_s) = (purpose(&choice.purpose), choice.design.duration_s);
-        terminal::say(format!("run {run}: {duration_s} s {purpose}"));
+        let line = format!("run {run}: {duration_s} s {purpose}");
+        self.0.suspend(|| terminal::say(line));
+        self.0.set_message("runs; playing");
     }
 
     fn ended(&self, round: &Round) {
-        terminal::say(format!("run {}: {}", round.run, answer(round)));
+        let line = format!("run {}: {}", round.run, answer(round));
+        self.0.suspend(|| terminal::say(line));
+        self.0.inc(1);
+        self.0.set_message("runs; designing the next");
     }
 
-    fn closes(&self, _: &Progress<'_>) {}
+    fn closes(&self, progress: &Progress<'_>) {
+        self.0
+            .set_message(format!("runs; closing the loop: {}", progress.text));
+    }
 }
 
 fn purpose(purpose: &Purpose) -> String {
