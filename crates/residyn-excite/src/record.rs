@@ -15,6 +15,9 @@ use crate::motion::WINDOW_S;
 /// below the rate of its rows.
 const BANDWIDTH: f64 = 15.0;
 
+/// How long the first command has been held when the motion begins, s: longer than delays and lags are.
+const RESTED_S: f64 = 0.5;
+
 /// A motion in rows with what drives it: `[joint][row]`, the drive of a row held until the next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
@@ -61,6 +64,8 @@ pub fn record(model: &Model, reference: &Reference) -> Result<Log, ExciteError> 
     let mut environment = Environment::new(&dynamics, Integrator::fine(substeps), step_s);
     let mut state: Vec<f64> = reference.q.iter().map(|q| q[0]).collect();
     state.extend(reference.qd.iter().map(|qd| qd[0]));
+    let first: Vec<f64> = reference.command.iter().map(|channel| channel[0]).collect();
+    rest(&mut environment, &state, &first, step_s);
     let mut log = Log {
         driven_by: model.driven_by(),
         path: "designed".into(),
@@ -88,4 +93,13 @@ pub fn record(model: &Model, reference: &Reference) -> Result<Log, ExciteError> 
         }
     }
     Ok(log)
+}
+
+/// Fill delays and lags as if the rig had rested under its first command.
+fn rest(environment: &mut Environment<'_>, state: &[f64], command: &[f64], step_s: f64) {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few hundred
+    let steps = (RESTED_S / step_s).ceil() as usize;
+    for before in (1..=steps).rev() {
+        environment.step(&mut state.to_vec(), command, -step_s * before as f64);
+    }
 }

@@ -271,3 +271,14 @@ fn commands_of_a_drive_keep_their_range() {
     let apart = log.q[0].iter().zip(&found.q[0]).map(|(a, b)| (a - b).abs());
     assert!(apart.fold(0.0, f64::max) < 0.02);
 }
+
+#[test]
+fn a_position_loop_whose_commands_come_late_begins_at_rest() {
+    let late = with(&model("servo"), effect("actuator_delay", 1, &[0.03]));
+    // The middle of the range is far from zero, where commands that were never given would be.
+    let limits = limits(vec![joint([1.0, 2.0], 1.8)]);
+    let found = design(&late, &[], &limits, 4.0, &Settings::default(), 1, &|_| ()).unwrap();
+    let log = found.recorded_by(&late).unwrap();
+    let off = (log.q[0].iter().zip(&found.q[0])).map(|(q, reference)| (q - reference).abs());
+    assert!(off.take(10).all(|off| off < 0.02));
+}
