@@ -196,11 +196,7 @@ fn typical(
     problem.declared.can_carry(effect, like.joint).ok()?;
     let joint = like.joint;
     let effect = problem.measured(effect, joint);
-    let mut fitted = FittedEffect::absent(&effect, joint);
-    for (slot, parameter) in fitted.values.iter_mut().zip(&effect.parameters) {
-        slot.0 = parameter.typical;
-    }
-    Some(fitted)
+    Some(FittedEffect::typical(&effect, joint))
 }
 
 /// The effect with its true values; `None` if the library has no such effect.

@@ -151,10 +151,7 @@ impl Known<'_> {
                 let Ok(effect) = self.library.effect(name) else {
                     continue;
                 };
-                let mut new = FittedEffect::absent(effect, joint);
-                for (value, parameter) in new.values.iter_mut().zip(&effect.parameters) {
-                    value.0 = parameter.typical;
-                }
+                let new = FittedEffect::typical(effect, joint);
                 if self.model.check_effect(&new, &effects).is_ok() {
                     effects.push(new);
                 }

@@ -56,7 +56,7 @@ pub enum Ended {
 pub struct Investigated {
     pub ended: Ended,
     pub rounds: Vec<Round>,
-    /// Of all runs; none if no run was allowed.
+    /// Of all runs.
     pub outcome: Outcome,
     /// Where the model was tested.
     pub region: Region,
@@ -119,9 +119,9 @@ impl Investigation<'_> {
             let log = self.play(&choice, run, &kept)?;
             kept.keep_log(&log)?;
             let newest = &kept.logs[run - 1..];
-            let before = outcome.as_ref().map(|outcome| unseen(outcome, newest));
+            let before = outcome.as_ref().map(|outcome| error_on(newest, outcome));
             let now = self.close(&kept.logs, watch)?;
-            let errors = [before, Some(unseen(&now, newest))];
+            let errors = (before, error_on(newest, &now));
             let motion_s = moved_s + newest[0].duration();
             let round = Round::new(run, choice.purpose, motion_s, &now, errors);
             watch.ended(&round);
@@ -188,7 +188,7 @@ impl Investigation<'_> {
         let start: Vec<f64> = design.q.iter().map(|q| q[0]).collect();
         let tracking = match self.plant.driven_by() {
             Quantity::Command => Tracking::none(self.model.joints),
-            _ => Tracking::of(&self.model.dynamics(), &start)?,
+            _ => Tracking::of(self.model, &start)?,
         };
         let speeds = self
             .limits
@@ -236,7 +236,7 @@ fn is_at_a_standstill(rounds: &[Round]) -> bool {
 }
 
 /// The open-loop error of an outcome's model on logs.
-fn unseen(outcome: &Outcome, logs: &[Log]) -> f64 {
+fn error_on(logs: &[Log], outcome: &Outcome) -> f64 {
     let dynamics = outcome.models.after.model.dynamics();
     assess(&dynamics, logs, &[AHEAD_S]).position_rms()
 }

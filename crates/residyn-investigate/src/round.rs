@@ -70,7 +70,7 @@ impl Round {
         purpose: Purpose,
         motion_s: f64,
         outcome: &Outcome,
-        [unseen_rms, rms]: [Option<f64>; 2],
+        (unseen_rms, rms): (Option<f64>, f64),
     ) -> Self {
         let named = |findings: &[residyn_core::closeloop::Finding]| {
             findings
@@ -91,7 +91,7 @@ impl Round {
                 .map(|alternative| Named::of(&alternative.effect))
                 .collect(),
             unseen_rms,
-            rms: rms.unwrap_or(f64::NAN),
+            rms,
         }
     }
 

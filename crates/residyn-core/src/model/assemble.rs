@@ -213,6 +213,11 @@ impl Model {
     /// The inertia that each joint has for its torque while the others are free (kg m^2 or kg), from the declared equations
     /// at rest with all angles at zero.
     pub fn joint_inertias(&self) -> Vec<f64> {
+        self.joint_inertias_at(&vec![0.0; self.joints])
+    }
+
+    /// The same at these angles.
+    pub fn joint_inertias_at(&self, q: &[f64]) -> Vec<f64> {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &[], &sign);
         assembly.apply_drive();
@@ -223,6 +228,7 @@ impl Model {
         let program = assembly.graph.finish(&mobility);
         let layout = self.layout();
         let mut inputs = vec![0.0; layout.time() + 1];
+        inputs[..q.len()].copy_from_slice(q);
         inputs[layout.driving().end..layout.time()].fill(NOMINAL);
         inputs.extend(self.values());
         program.eval(&inputs).into_iter().map(f64::recip).collect()

@@ -63,6 +63,15 @@ impl FittedEffect {
         }
     }
 
+    /// The effect on a joint with the typical values of its parameters.
+    pub fn typical(effect: &Effect, joint: Joint) -> Self {
+        let mut new = Self::absent(effect, joint);
+        for (value, parameter) in new.values.iter_mut().zip(&effect.parameters) {
+            value.0 = parameter.typical;
+        }
+        new
+    }
+
     /// The same effect with what the logs need not determine held where fits start; `None` if there is nothing of the kind.
     pub(crate) fn with_unknown_held(&self) -> Option<Self> {
         let effect = self.effect.with_unknown_held()?;

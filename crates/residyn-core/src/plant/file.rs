@@ -295,10 +295,7 @@ impl Plant {
                 found: joint,
             });
         }
-        let mut new = FittedEffect::absent(effect, joint);
-        for (value, parameter) in new.values.iter_mut().zip(&effect.parameters) {
-            value.0 = parameter.typical;
-        }
+        let mut new = FittedEffect::typical(effect, joint);
         let known: Vec<&str> = effect.parameters.iter().map(|p| p.name.as_str()).collect();
         for (key, value) in values {
             let Some(k) = known.iter().position(|known| known == key) else {

@@ -579,11 +579,7 @@ pub(crate) mod tests {
 
     /// An effect with two states that depend on each other, on the load and on parameters, at its typical values.
     pub(crate) fn bristles(joint: Joint) -> FittedEffect {
-        let mut effect = FittedEffect::absent(&BRISTLES.parse().unwrap(), joint);
-        for (value, parameter) in effect.values.iter_mut().zip(&effect.effect.parameters) {
-            value.0 = parameter.typical;
-        }
-        effect
+        FittedEffect::typical(&BRISTLES.parse().unwrap(), joint)
     }
 
     /// A pendulum with an effect of one state, in these lines.
