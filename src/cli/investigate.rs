@@ -1,5 +1,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use clap::Args;
@@ -10,7 +12,7 @@ use super::call::{Begun, files};
 use super::elsewhere::Elsewhere;
 use super::excite::read_limits;
 use super::{Answer, Common, inputs, interrupt, progress, terminal};
-use residyn_core::closeloop::Progress;
+use residyn_core::closeloop::{Progress, Stage};
 use residyn_core::model::{Call, Model, Origin};
 use residyn_excite::Limits;
 use residyn_investigate::{
@@ -49,6 +51,9 @@ pub(super) struct Arguments {
     /// Motion of one run
     #[arg(long, value_name = "TIME", default_value = "8s", value_parser = seconds)]
     run: f64,
+    /// Time after which the search for effects after a run stops as it stands: 90s, 10min, 2h
+    #[arg(long, value_name = "TIME", default_value = "10min", value_parser = humantime::parse_duration)]
+    budget: Duration,
     /// Draw motions at random within the limits, as a comparison
     #[arg(long)]
     random_motions: bool,
@@ -105,7 +110,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few runs
     let bar = progress::bar((arguments.motion / arguments.run) as usize);
-    let found = investigation.carry_out(&folder, &Told(&bar))?;
+    let told = Told {
+        bar: &bar,
+        budget: arguments.budget,
+        closing_since: Mutex::new(Instant::now()),
+    };
+    let found = investigation.carry_out(&folder, &told)?;
     bar.finish_and_clear();
     let value = value(&found, &identity.config, arguments.common.seed);
     let call = begun.call(&read);
@@ -143,27 +153,46 @@ fn identity(arguments: &Arguments, model: &Model) -> Result<Identity> {
     })
 }
 
-/// Tells what is played and what was found, line by line, and counts the runs that were allowed.
-struct Told<'b>(&'b ProgressBar);
+/// Tells what is played and what was found, line by line, counts the runs that were allowed, and ends a search whose time is spent.
+struct Told<'b> {
+    bar: &'b ProgressBar,
+    budget: Duration,
+    closing_since: Mutex<Instant>,
+}
 
 impl Watch for Told<'_> {
     fn plays(&self, run: usize, choice: &Choice) {
         let (purpose, duration_s) = (purpose(&choice.purpose), choice.design.duration_s);
         let line = format!("run {run}: {duration_s} s {purpose}");
-        self.0.suspend(|| terminal::say(line));
-        self.0.set_message("runs; playing");
+        self.bar.suspend(|| terminal::say(line));
+        self.bar.set_message("runs; playing");
     }
 
     fn ended(&self, round: &Round) {
         let line = format!("run {}: {}", round.run, answer(round));
-        self.0.suspend(|| terminal::say(line));
-        self.0.inc(1);
-        self.0.set_message("runs; designing the next");
+        self.bar.suspend(|| terminal::say(line));
+        self.bar.inc(1);
+        self.bar.set_message("runs; designing the next");
     }
 
     fn closes(&self, progress: &Progress<'_>) {
-        self.0
+        if progress.stage == Stage::Audit {
+            *self.since() = Instant::now();
+        }
+        self.bar
             .set_message(format!("runs; closing the loop: {}", progress.text));
+    }
+
+    fn has_to_end(&self) -> bool {
+        self.since().elapsed() >= self.budget
+    }
+}
+
+impl Told<'_> {
+    fn since(&self) -> MutexGuard<'_, Instant> {
+        self.closing_since
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 

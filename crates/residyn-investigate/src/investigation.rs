@@ -70,8 +70,13 @@ pub trait Watch: Sync {
     /// A round ended, or was found in the folder.
     fn ended(&self, round: &Round);
 
-    /// What closing the loop is doing.
+    /// What closing the loop is doing; each time begins with the audit.
     fn closes(&self, progress: &Progress<'_>);
+
+    /// Whether the present search for effects is to end as it stands: the round is not settled then.
+    fn has_to_end(&self) -> bool {
+        false
+    }
 }
 
 /// Passes progress on.
@@ -80,6 +85,10 @@ struct Closing<'w>(&'w dyn Watch);
 impl residyn_core::closeloop::Watch for Closing<'_> {
     fn see(&self, progress: Progress<'_>) {
         self.0.closes(&progress);
+    }
+
+    fn has_to_end(&self) -> bool {
+        self.0.has_to_end()
     }
 }
 

@@ -23,6 +23,8 @@ pub struct Round {
     pub supported: Vec<Named>,
     /// Explanations that the runs do not tell from the established ones.
     pub alternatives: Vec<Named>,
+    /// Whether the search for effects was stopped because its time ran out.
+    pub stopped: bool,
     /// Root mean square of the open-loop error over half a second of this run, which the model of the runs before had not seen,
     /// rad (or m); none for the first run.
     pub unseen_rms: Option<f64>,
@@ -90,16 +92,17 @@ impl Round {
             alternatives: (open_alternatives(outcome))
                 .map(|alternative| Named::of(&alternative.effect))
                 .collect(),
+            stopped: effects.stopped,
             unseen_rms,
             rms,
         }
     }
 
-    /// Whether nothing is open: everything that was found is established, nothing else would explain it as well, and nothing
-    /// significant is left.
+    /// Whether nothing is open: the search came to its end, everything that was found is established, nothing else would explain it
+    /// as well, and nothing significant is left.
     pub fn is_settled(&self) -> bool {
         let is_explained = matches!(self.verdict, Verdict::Explained | Verdict::NoMissingEffect);
-        is_explained && self.supported.is_empty() && self.alternatives.is_empty()
+        !self.stopped && is_explained && self.supported.is_empty() && self.alternatives.is_empty()
     }
 
     /// Whether it has the established names of another.

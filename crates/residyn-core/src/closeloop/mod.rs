@@ -20,6 +20,7 @@ mod error_model;
 mod error_model_choice;
 mod establish;
 mod every_log;
+mod excess;
 mod external_force;
 mod fit;
 mod fitted;

@@ -49,10 +49,7 @@ pub(super) fn refined<'a>(
     declared: &Fitted,
     chosen: &Fitted,
 ) -> Refined<'a> {
-    let mut fine = match problem.error_model {
-        ErrorModel::OutputError => problem.refined(),
-        ErrorModel::InverseDynamics => problem.weighed_by(chosen),
-    };
+    let mut fine = problem.finer(chosen);
     let mut identifiability = problem.identifiability.clone();
     let (problem, before, mut after, failure) = loop {
         match rayon::join(|| fine.estimate(declared), || fine.estimate(chosen)) {
@@ -93,6 +90,14 @@ impl Refined<'_> {
 }
 
 impl<'a> Problem<'a> {
+    /// The same problem in fine steps or, for torques, with the noise that a model leaves.
+    pub(super) fn finer(&self, fitted: &Fitted) -> Self {
+        match self.error_model {
+            ErrorModel::OutputError => self.refined(),
+            ErrorModel::InverseDynamics => self.weighed_by(fitted),
+        }
+    }
+
     /// The same problem in finer steps, to estimate a model that has been chosen. Smoothing velocities that the model
     /// file gives stay, and so do parameters that the logs do not determine: the intervals of the others are relative
     /// to them.
@@ -121,6 +126,14 @@ impl<'a> Problem<'a> {
             ..self.clone()
         }
     }
+
+    /// The same problem with each joint's noise as a model leaves it.
+    fn weighed_by(&self, fitted: &Fitted) -> Self {
+        let dynamics = self.compiled(&fitted.model);
+        let values = Values::of(&dynamics, self.logs);
+        let noise = (self.shooting).left_by(&dynamics, &values, &fitted.fit.start_states);
+        self.over(self.shooting.with_noise(&noise))
+    }
 }
 
 impl Problem<'_> {
@@ -136,14 +149,6 @@ impl Problem<'_> {
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
         identifiable_bodies(&dynamics, self.declared, &values, &fitted.fit, uncertainty)
-    }
-
-    /// The same problem with each joint's noise as a model leaves it.
-    fn weighed_by(&self, fitted: &Fitted) -> Self {
-        let dynamics = self.compiled(&fitted.model);
-        let values = Values::of(&dynamics, self.logs);
-        let noise = (self.shooting).left_by(&dynamics, &values, &fitted.fit.start_states);
-        self.over(self.shooting.with_noise(&noise))
     }
 }
 

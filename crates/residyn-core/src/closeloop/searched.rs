@@ -75,13 +75,17 @@ impl<'a> Searched<'a> {
         &model.effects[self.declared.problem.added(model)]
     }
 
-    /// Plainer models in place of the chosen one, as long as they predict whole logs better.
+    /// Plainer models in place of the chosen one, as long as they predict whole logs better, and simpler effects in place of those
+    /// that do no more.
     fn plainest(mut self, apart: &[Log], watch: &dyn Watch) -> Self {
         if (self.left.as_ref()).is_some_and(|left| !left.is_significant()) {
             self.chosen.unmasked = self.chosen.named().cloned().collect();
         }
         while let Some(plainer) = self.plainer(apart, watch) {
             self = plainer;
+        }
+        while let Some(simpler) = self.without_excess(watch) {
+            self = simpler;
         }
         self
     }

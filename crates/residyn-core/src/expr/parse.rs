@@ -62,6 +62,24 @@ impl Formula {
         names
     }
 
+    /// By how much a comparison holds: its larger side less the smaller one. `None` of a formula that is no comparison.
+    pub fn margin(&self) -> Option<Self> {
+        let (larger, smaller) = match &self.root.kind {
+            Kind::Infix(Infix::Greater | Infix::AtLeast, a, b) => (a, b),
+            Kind::Infix(Infix::Plain(Binary::Less) | Infix::AtMost, a, b) => (b, a),
+            _ => return None,
+        };
+        let minus = Infix::Plain(Binary::Sub);
+        let root = Term {
+            kind: Kind::Infix(minus, larger.clone(), smaller.clone()),
+            ..self.root.clone()
+        };
+        Some(Self {
+            root,
+            ..self.clone()
+        })
+    }
+
     /// The formula with other names, where there is one.
     ///
     /// # Panics
@@ -405,6 +423,15 @@ mod tests {
 
     fn message(text: &str) -> String {
         parse(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_comparison_holds_by_a_margin() {
+        let margin = |text: &str| parse(text).unwrap().margin();
+        for text in ["a > b", "a >= b", "b < a", "b <= a"] {
+            assert_eq!(margin(text).unwrap().names(), ["a", "b"], "{text}");
+        }
+        assert_eq!(margin("a - b"), None);
     }
 
     #[test]

@@ -475,6 +475,12 @@ impl Effect {
         self.valid_if.as_ref().is_none_or(condition)
     }
 
+    /// By how much these values of the parameters fulfil the comparison in `valid_if`; `None` if there is none.
+    pub fn margin(&self, values: &[f64]) -> Option<f64> {
+        let margin = self.valid_if.as_ref()?.margin()?;
+        Some(self.evaluate(&margin, values, |_| 0.0))
+    }
+
     /// The value of a formula, where `of_joint` gives its joint's `q`, `qd`, `tau` and so on; measured columns are at
     /// [`NOMINAL`], internal states at zero.
     fn evaluate(&self, formula: &Formula, values: &[f64], of_joint: impl Fn(&str) -> f64) -> f64 {

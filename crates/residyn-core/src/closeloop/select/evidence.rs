@@ -48,7 +48,7 @@ pub fn p_value_by(
 }
 
 /// Hotelling's form of the F test: a quadratic form in estimates whose covariance comes from few blocks.
-fn f_test(statistic: f64, restrictions: usize, blocks: usize) -> f64 {
+pub fn f_test(statistic: f64, restrictions: usize, blocks: usize) -> f64 {
     let (q, freedom) = (restrictions as f64, blocks as f64 - restrictions as f64);
     if freedom < 1.0 {
         return 1.0;

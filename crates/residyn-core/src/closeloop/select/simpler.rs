@@ -6,7 +6,7 @@ use crate::model::{Effect, EffectParameter, FittedEffect};
 
 /// Every set in which one effect is replaced by some of the effects that it contains and the set lacks, fewest first.
 /// Only effects at the indices `added` change.
-pub(super) fn simpler(
+pub fn simpler(
     problem: &Problem<'_>,
     effects: &[FittedEffect],
     added: Range<usize>,
