@@ -8,6 +8,9 @@ mod predictor;
 mod session;
 mod task;
 
+#[cfg(test)]
+mod tests;
+
 pub use bounds::Bounds;
 pub use controller::{Controller, LostPlan, Policy, RandomTorque};
 pub use driven::{DriveError, Driven, Held, Simulated};

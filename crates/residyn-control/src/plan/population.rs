@@ -128,3 +128,40 @@ fn put_below(known: &mut Vec<(f32, usize)>, excess: impl Fn(usize) -> f32) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The ranking of candidates with these returns and excesses.
+    fn ranked(returns: &[f32], excess: &[f32]) -> Vec<(f32, usize)> {
+        let rows = |values: &[f32]| {
+            let mut rows = Rows::splat(0.0);
+            rows[..values.len()].copy_from_slice(values);
+            rows
+        };
+        let (returns_of, excess_of) = (rows(returns), rows(excess));
+        let block = Evaluated {
+            inputs: &[],
+            returns: &returns_of,
+            excess: (!excess.is_empty()).then_some(&excess_of),
+        };
+        Population::new([block].into_iter(), returns.len()).elite(returns.len())
+    }
+
+    #[test]
+    fn a_candidate_beyond_limits_ranks_below_all_within_by_how_far_it_is_beyond() {
+        let returns = [1.0, 100.0, 3.0, 200.0, f32::NAN, 2.0];
+        let found = ranked(&returns, &[0.0, 0.5, 0.0, 2.0, 0.0, f32::NAN]);
+        assert_eq!(found, [(3.0, 2), (1.0, 0), (0.5, 1), (-1.0, 3)]);
+        // One within, and none.
+        let found = ranked(&[1.0, 100.0], &[0.0, 0.5]);
+        assert_eq!(found, [(1.0, 0), (-1.0, 1)]);
+        let found = ranked(&[1.0, 100.0], &[0.25, 0.5]);
+        assert_eq!(found, [(-0.5, 0), (-1.0, 1)]);
+        // All within, and no limits.
+        for excess in [&[0.0, 0.0][..], &[]] {
+            assert_eq!(ranked(&[1.0, 100.0], excess), [(100.0, 1), (1.0, 0)]);
+        }
+    }
+}
