@@ -9,7 +9,7 @@ use super::address::Address;
 use super::description::{Clock, Description};
 use super::error::RemoteError;
 use super::guard::Guard;
-use super::message::{FromPlant, PROTOCOL, Row, ToPlant};
+use super::message::{FromPlant, LONGEST_LINE, PROTOCOL, Row, ToPlant};
 use super::recorder::Recorder;
 use super::wire::{MOST_WAITING, Wire};
 
@@ -21,6 +21,8 @@ const GREETING: Duration = Duration::from_secs(60);
 const RESETTING: Duration = Duration::from_secs(300);
 /// A step of a slow simulator.
 const STEPPING: Duration = Duration::from_secs(30);
+/// Bytes of a number, with what separates it from the next.
+const LONGEST_NUMBER: usize = 32;
 /// Commands that are remembered until rows say when they acted.
 const REMEMBERED: usize = 4096;
 
@@ -193,7 +195,8 @@ impl Remote {
         self.refuse_infinite(command, next)?;
         let answers = self.episode.as_ref().expect("it has begun").periods;
         self.catch_up()?;
-        let most = self.description.next;
+        // A line has room for them.
+        let most = (self.description.next).min(LONGEST_LINE / (LONGEST_NUMBER * command.len()) / 2);
         let episode = self.episode.as_mut().expect("it has begun");
         let late = episode.periods - answers;
         // The plan counts on what acts now, and goes on after the periods that passed without it.

@@ -49,6 +49,7 @@ fn speed_excess(joint: usize, most: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::Bounds;
+    use residyn_core::limits::JOINTS;
 
     #[test]
     fn an_excess_counts_the_braking_zone_and_is_a_share_of_each_limit() {
@@ -74,6 +75,12 @@ mod tests {
             let value = excess.value(&state, &[0.0, 0.0], 0.0);
             assert!((value - found).abs() < 1e-12, "{state:?} {value}");
         }
+        let many = Bounds {
+            angle: vec![Some([-1.0, 1.0]); JOINTS],
+            speed: vec![Some(1e-9); JOINTS],
+            brake_s: 1e-9,
+        };
+        assert!(many.excess(JOINTS).is_some());
         let none = Bounds {
             angle: vec![None, None],
             ..Bounds::default()
