@@ -869,18 +869,23 @@ class Rod(Plant):
     step_s = 0.05
     clock = "wall"
     limits = Limits(command=[(-3.0, 3.0)])
+    measured = ["applied"]
 
     def reset(self, seed, start):
         self.q, self.qd, self.torque, self.now = math.pi, 0.0, 0.0, time.monotonic()
-        return Row(q=[self.q], qd=[self.qd])
+        return self.row()
 
     def step(self, command):
         while self.now < time.monotonic():
             self.qd += 1e-3 * (15.0 * math.sin(self.q) + 3.0 * self.torque)
             self.q += 1e-3 * self.qd
             self.now += 1e-3
-        self.torque = command[0]
-        return Row(q=[self.q], qd=[self.qd])
+        row = self.row()
+        self.torque = float(command[0])
+        return row
+
+    def row(self):
+        return Row(q=[self.q], qd=[self.qd], measured={"applied": self.torque})
 
     def stop(self):
         self.torque = 0.0
@@ -927,3 +932,6 @@ def test_the_program_controls_a_rod_that_does_not_wait(tmp_path: Path) -> None:
         assert episode["late"] >= 0 and episode["latency_s"] >= 0.05, found
         log = residyn.read_log(tmp_path / "e" / f"episode-{number:03}.csv")
         assert len(log.time) >= 41 and np.all(np.abs(log["tau1"]) <= 2.0)
+        # What the log says acted up to each row is what the plant applied, however late answers were.
+        rows = np.genfromtxt(tmp_path / "e" / f"episode-{number:03}.csv", delimiter=",", names=True)
+        assert np.array_equal(rows["tau1"][:-1], rows["u_applied"][1:])
