@@ -19,8 +19,10 @@ import residyn
 from conftest import command
 from residyn.plants import Limits, Plant, PlantError, Row
 from residyn.plants.description import description
+from residyn.plants.episode import WallEpisode
 from residyn.plants.gymnasium import READY, GymnasiumPlant, acrobot
 from residyn.plants.guard import Guard
+from residyn.plants.messages import Reset, Step
 from residyn.plants.mujoco import MujocoPlant, Sensors
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -121,7 +123,7 @@ GO = TRACE.with_suffix(".go")
 class Traced(Plant):
     name = "traced"
     joints = ["shaft"]
-    step_s = 0.01
+    step_s = {step_s}
     clock = "{clock}"
     patience = 3
     limits = Limits(command=[(-2.0, 2.0)], rate=[100.0])
@@ -160,9 +162,11 @@ sys.exit(serve(Traced(), sys.argv[2:]))
 class Script:
     """A plant that writes down what is done to it."""
 
-    def __init__(self, folder: Path, clock: str = "simulated", body: str = "pass", stop: str = "pass") -> None:
+    def __init__(
+        self, folder: Path, clock: str = "simulated", body: str = "pass", stop: str = "pass", step_s: float = 0.01
+    ) -> None:
         self.path, self.trace = folder / "traced.py", folder / "trace.txt"
-        self.path.write_text(TRACED.format(clock=clock, body=body, stop=stop))
+        self.path.write_text(TRACED.format(clock=clock, body=body, stop=stop, step_s=step_s))
         self.arguments = (self.path, self.trace)
 
     def done(self) -> list[str]:
@@ -297,6 +301,10 @@ MALFORMED = {
     "two joints": b'{"type":"step","id":2,"command":[1,1]}',
     "an id left out": b'{"type":"step","id":3,"command":[1]}',
     "an id again": b'{"type":"step","id":1,"command":[1]}',
+    "next that is a command": b'{"type":"step","id":2,"command":[1],"next":[1]}',
+    "next of two joints": b'{"type":"step","id":2,"command":[1],"next":[[1],[1,1]]}',
+    "next that is not finite": b'{"type":"step","id":2,"command":[1],"next":[[1],[1e999]]}',
+    "next that is null": b'{"type":"step","id":2,"command":[1],"next":null}',
     "unknown type": b'{"type":"jump"}',
     "a second hello": json.dumps(HELLO).encode(),
     "a seed that is a boolean": b'{"type":"reset","seed":true}',
@@ -420,6 +428,118 @@ def test_the_watchdog_holds_the_safe_command_until_the_next(tmp_path: Path) -> N
     # Three periods of silence at most, fewer if the machine was late and periods were left out.
     assert 1 <= held <= 3 and done[first + held] == "step 0.0"
     assert "step -0.5" in done[first + held :] and done[-1] == "stop"
+
+
+def test_in_silence_a_plant_goes_on_with_the_next_commands_until_the_watchdog_acts(tmp_path: Path) -> None:
+    script = Script(tmp_path, "wall")
+    with child(*script.arguments) as plant:
+        plant.send(HELLO)
+        assert plant.receive()["next"] == 2
+        plant.send(RESET)
+        plant.row_of(0)
+        plant.send({**step(1, 0.5), "next": [[1.0], [9.0], [0.1]]})
+        acted = [plant.row_of(1)]
+        while (row := plant.receive()["rows"][0])["command"]:
+            acted.append(row)
+        assert row["tau"] == [0.0] and "ahead" not in row
+        # A newer step ends what came with the one before.
+        plant.send({**step(2, -0.5), "next": []})
+        assert "ahead" not in plant.row_of(2)
+        plant.send(STOP)
+        plant.receive_until("stopped")
+    # Those of periods that the machine was late for are left out, and the rate allows 1 N m a step.
+    found = [row.get("ahead", 0) for row in acted]
+    assert found[0] == 0 and found == sorted(set(found)) and found[-1] <= 2
+    held = {0: "step 0.5", 1: "step 1.0", 2: "step 2.0" if 1 in found else "step 1.5"}
+    done = script.done()
+    first = done.index("step 0.5")
+    assert done[first : first + len(found) + 1] == [*(held[ahead] for ahead in found), "step 0.0"]
+
+
+class Still(Plant):
+    """A plant on the wall clock whose periods a test ends, and what was done to it."""
+
+    name = "still"
+    joints = ("shaft",)
+    step_s = 3600.0
+    clock = "wall"
+    patience = 4
+    limits = Limits(command=[(-2.0, 2.0)], rate=[1.0 / 3600.0], angle=[(-1.0, 1.0)])
+    q = 0.0
+
+    def __init__(self) -> None:
+        self.done: list[float] = []
+
+    def reset(self, seed: int, start: object) -> Row:
+        return Row(q=[self.q], qd=[0.0])
+
+    def step(self, command: Any) -> Row:
+        self.done.append(float(command[0]))
+        time = float(len(self.done))
+        return Row(q=[self.q], qd=[0.0], time=time)
+
+    def stop(self) -> None:
+        """There is nothing to switch off."""
+
+
+def ahead(number: int, *commands: float) -> Step:
+    first, *later = (np.array([command]) for command in commands)
+    return Step(number, first, later)
+
+
+def ticks(episode: WallEpisode, count: int) -> list[tuple[int, int]]:
+    """What acted up to the rows of so many periods: id and how many of its next."""
+    rows = [episode.tick()[0] for _ in range(count)]
+    return [(row["command"], row.get("ahead", 0)) for row in rows]
+
+
+def test_next_commands_act_one_a_period_and_the_last_is_held_until_the_watchdog() -> None:
+    plant = Still()
+    episode = WallEpisode(plant, Reset(1, None))
+    episode.take(ahead(1, 0.5, 0.6, 0.7))
+    assert ticks(episode, 6) == [(0, 0), (1, 0), (1, 1), (1, 2), (1, 2), (0, 0)]
+    assert plant.done == [0.5, 0.6, 0.7, 0.7, 0.0, 0.0]
+
+
+def test_a_newer_command_takes_the_place_of_those_that_came_with_the_one_before() -> None:
+    plant = Still()
+    episode = WallEpisode(plant, Reset(1, None))
+    episode.take(ahead(1, 0.5, 0.6, 0.7))
+    ticks(episode, 2)
+    episode.take(ahead(2, -0.1, -0.2))
+    assert ticks(episode, 3) == [(1, 1), (2, 0), (2, 1)]
+    assert plant.done == [0.5, 0.6, -0.1, -0.2, -0.2]
+
+
+def test_next_commands_are_clipped_to_range_rate_and_braking_zone() -> None:
+    plant = Still()
+    episode = WallEpisode(plant, Reset(1, None))
+    episode.take(ahead(1, 0.5, 9.0, 9.0, 9.0))
+    ticks(episode, 2)
+    assert plant.done == [0.5, 1.5]
+    # The row of this period says that the joint is past its limit.
+    plant.q = 1.2
+    ticks(episode, 2)
+    assert plant.done == [0.5, 1.5, 2.0, 0.0]
+
+
+def test_a_simulated_plant_ignores_next_commands(tmp_path: Path) -> None:
+    script = Script(tmp_path)
+    found = rows(script.arguments, RESET, {**step(1, 0.5), "next": [[1.0]]}, step(2, -0.1))
+    assert [row.get("ahead", 0) for row in found] == [0, 0, 0]
+    assert script.done() == ["reset", "step 0.5", "step -0.1", "stop"]
+
+
+def test_a_flood_of_messages_stops_the_plant_before_the_host_is_told(tmp_path: Path) -> None:
+    # A period that does not end: nothing but the flood can stop this plant.
+    script = Script(tmp_path, "wall", step_s=3600.0)
+    with child(*script.arguments) as plant:
+        plant.send(HELLO, RESET)
+        with suppress(BrokenPipeError):
+            for number in range(1, 1500):
+                plant.send_line(json.dumps(step(number, 0.5)).encode())
+        assert "more than 1000 messages in a period" in plant.receive_until("error")["message"]
+        assert script.done() == ["reset", "stop"]
 
 
 def test_of_commands_within_a_period_the_newest_acts(tmp_path: Path) -> None:
@@ -749,18 +869,23 @@ class Rod(Plant):
     step_s = 0.05
     clock = "wall"
     limits = Limits(command=[(-3.0, 3.0)])
+    measured = ["applied"]
 
     def reset(self, seed, start):
         self.q, self.qd, self.torque, self.now = math.pi, 0.0, 0.0, time.monotonic()
-        return Row(q=[self.q], qd=[self.qd])
+        return self.row()
 
     def step(self, command):
         while self.now < time.monotonic():
             self.qd += 1e-3 * (15.0 * math.sin(self.q) + 3.0 * self.torque)
             self.q += 1e-3 * self.qd
             self.now += 1e-3
-        self.torque = command[0]
-        return Row(q=[self.q], qd=[self.qd])
+        row = self.row()
+        self.torque = float(command[0])
+        return row
+
+    def row(self):
+        return Row(q=[self.q], qd=[self.qd], measured={"applied": self.torque})
 
     def stop(self):
         self.torque = 0.0
@@ -807,3 +932,6 @@ def test_the_program_controls_a_rod_that_does_not_wait(tmp_path: Path) -> None:
         assert episode["late"] >= 0 and episode["latency_s"] >= 0.05, found
         log = residyn.read_log(tmp_path / "e" / f"episode-{number:03}.csv")
         assert len(log.time) >= 41 and np.all(np.abs(log["tau1"]) <= 2.0)
+        # What the log says acted up to each row is what the plant applied, however late answers were.
+        rows = np.genfromtxt(tmp_path / "e" / f"episode-{number:03}.csv", delimiter=",", names=True)
+        assert np.array_equal(rows["tau1"][:-1], rows["u_applied"][1:])

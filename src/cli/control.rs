@@ -352,8 +352,12 @@ impl Policy for Timed<'_, '_, '_> {
         torque
     }
 
-    fn sent(&mut self, torque: &[f64], steps: usize) {
-        self.controller.sent(torque, steps);
+    fn ahead(&self) -> Vec<Vec<f64>> {
+        self.controller.ahead()
+    }
+
+    fn held(&mut self, torques: &[Vec<f64>]) {
+        self.controller.held(torques);
     }
 }
 

@@ -188,7 +188,8 @@ impl Controlled {
         self.lateness().map_or(0, |lateness| lateness.latency())
     }
 
-    /// Keep the commands of a task that is planned with `model` within the plant's limits.
+    /// Keep the commands of a task that is planned with `model` within the plant's limits, and the states of its plans as far as
+    /// they can be.
     ///
     /// # Errors
     /// A model or task of another plant.

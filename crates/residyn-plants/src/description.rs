@@ -1,7 +1,7 @@
 use serde::Deserialize;
 
 use super::controlled::Unsuited;
-use residyn_control::control::Task;
+use residyn_control::control::{Bounds, Task};
 use residyn_core::data::Quantity;
 use residyn_core::plant::check_step;
 
@@ -21,6 +21,16 @@ pub struct Description {
     /// Names of further values in rows.
     #[serde(default)]
     pub measured: Vec<String>,
+    /// Steps of silence after which a plant that moves by itself takes its safe command.
+    #[serde(default = "usual_patience")]
+    pub patience: usize,
+    /// How many commands for the steps after it a step may carry.
+    #[serde(default)]
+    pub next: usize,
+}
+
+fn usual_patience() -> usize {
+    5
 }
 
 /// What commands are.
@@ -76,8 +86,19 @@ fn usual_brake_s() -> f64 {
     0.1
 }
 
+impl Limits {
+    /// Those of the state.
+    fn bounds(&self) -> Bounds {
+        Bounds {
+            angle: self.angle.clone().unwrap_or_default(),
+            speed: self.speed.clone().unwrap_or_default(),
+            brake_s: self.brake_s,
+        }
+    }
+}
+
 impl Description {
-    /// Keep the commands of a task within this plant's limits.
+    /// Keep the commands of a task within this plant's limits, and the states of its plans as far as they can be.
     ///
     /// # Errors
     /// Another step, or no command that both allow.
@@ -104,6 +125,7 @@ impl Description {
                 });
             }
         }
+        task.bounds = self.limits.bounds();
         Ok(())
     }
 
@@ -115,6 +137,9 @@ impl Description {
         }
         if let Err(fault) = check_step(self.step_s) {
             return Some(fault);
+        }
+        if self.patience == 0 {
+            return Some("`patience` is 0; give at least one step".into());
         }
         let mut names = self.joints.iter().chain([&self.name]);
         if let Some(name) = names.find(|name| name.chars().any(char::is_control)) {

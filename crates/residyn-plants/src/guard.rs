@@ -26,6 +26,24 @@ impl Guard {
         }
     }
 
+    /// Another command was applied than the one that was admitted last.
+    pub fn applied(&mut self, command: Vec<f64>) {
+        self.last = command;
+    }
+
+    /// Commands for the steps after the one that was admitted last. They keep to range and rate; in which state they act nobody
+    /// knows, and the plant brakes.
+    pub fn continued(&self, next: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let clipped = next.iter().scan(self.last.clone(), |last, asked| {
+            let joints = asked.iter().enumerate();
+            *last = joints
+                .map(|(joint, asked)| self.clipped(joint, *asked, last[joint]))
+                .collect();
+            Some(last.clone())
+        });
+        clipped.collect()
+    }
+
     /// The command next to the one that is asked that may be sent in the measured state.
     pub fn admit(&mut self, command: &[f64], q: &[f64], qd: &[f64]) -> Vec<f64> {
         let admitted = (command.iter().enumerate())
@@ -37,15 +55,11 @@ impl Guard {
     fn admit_one(&self, joint: usize, asked: f64, q: f64, qd: f64) -> f64 {
         let Description {
             limits,
-            step_s,
             command,
             safe,
             ..
         } = &self.description;
-        let range = limits.command[joint];
-        let of = |list: &Option<Vec<Option<f64>>>| list.as_ref().and_then(|list| list[joint]);
-        let change = of(&limits.rate).map_or(f64::INFINITY, |rate| rate * step_s);
-        let speed = of(&limits.speed).unwrap_or(f64::INFINITY);
+        let speed = limit(&limits.speed, joint);
         let angle = limits.angle.as_ref().and_then(|list| list[joint]);
         let [low, high] = angle.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let ahead = q + limits.brake_s * qd;
@@ -53,16 +67,31 @@ impl Guard {
             Commanded::Torque => safe[joint],
             Commanded::Position => q,
         };
-        let last = self.last[joint];
-        let mut admitted = clip(clip(asked, range), [last - change, last + change]);
+        let mut admitted = self.clipped(joint, asked, self.last[joint]);
         if q.max(ahead) > high || qd > speed {
             admitted = admitted.min(neutral);
         }
         if q.min(ahead) < low || qd < -speed {
             admitted = admitted.max(neutral);
         }
-        clip(admitted, range)
+        clip(admitted, limits.command[joint])
     }
+
+    /// Within range, and within rate of the command before.
+    fn clipped(&self, joint: usize, asked: f64, last: f64) -> f64 {
+        let Description { limits, step_s, .. } = &self.description;
+        let change = limit(&limits.rate, joint) * step_s;
+        clip(
+            clip(asked, limits.command[joint]),
+            [last - change, last + change],
+        )
+    }
+}
+
+/// Of a joint; infinite if it has none.
+fn limit(list: &Option<Vec<Option<f64>>>, joint: usize) -> f64 {
+    let given = list.as_ref().and_then(|list| list[joint]);
+    given.unwrap_or(f64::INFINITY)
 }
 
 fn clip(value: f64, [low, high]: [f64; 2]) -> f64 {
@@ -90,6 +119,8 @@ mod tests {
             },
             safe: vec![0.0],
             measured: Vec::new(),
+            patience: 5,
+            next: 0,
         }
     }
 
@@ -124,6 +155,18 @@ mod tests {
             assert_eq!(guard.admit(&[9.0], &[0.0], &[0.0]), [sent]);
         }
         assert_eq!(guard.admit(&[9.0], &[2.0], &[0.0]), [0.0]);
+    }
+
+    #[test]
+    fn commands_for_later_keep_to_range_and_rate_and_leave_the_next_as_it_was() {
+        let mut guard = Guard::new(&described(Commanded::Torque), &[0.0]);
+        guard.admit(&[0.5], &[0.0], &[0.0]);
+        let later = guard.continued(&[vec![9.0], vec![9.0], vec![-9.0]]);
+        assert_eq!(later, [[1.5], [2.0], [1.0]]);
+        assert_eq!(guard.admit(&[9.0], &[0.0], &[0.0]), [1.5]);
+        // The plant went on by itself.
+        guard.applied(vec![-1.0]);
+        assert_eq!(guard.admit(&[9.0], &[0.0], &[0.0]), [0.0]);
     }
 
     #[test]

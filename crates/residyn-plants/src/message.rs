@@ -28,6 +28,8 @@ pub enum ToPlant<'a> {
     Step {
         id: u64,
         command: &'a [f64],
+        #[serde(skip_serializing_if = "<[_]>::is_empty")]
+        next: &'a [Vec<f64>],
     },
     Stop,
 }
@@ -66,6 +68,9 @@ pub struct Row {
     /// Id of the command that acted up to the row; 0 for the safe command.
     #[serde(default)]
     pub command: u64,
+    /// How many of that command's next ones were applied: the last of them acted up to the row, or the command itself.
+    #[serde(default)]
+    pub ahead: usize,
     /// Further values by name.
     #[serde(default)]
     pub measured: BTreeMap<String, f64>,

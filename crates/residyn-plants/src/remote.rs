@@ -1,17 +1,17 @@
 use std::collections::VecDeque;
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use residyn_control::control::{DriveError, Driven};
+use residyn_control::control::{DriveError, Driven, Held};
 use residyn_core::data::Log;
 
 use super::address::Address;
 use super::description::{Clock, Description};
 use super::error::RemoteError;
 use super::guard::Guard;
-use super::message::{FromPlant, PROTOCOL, Row, ToPlant};
+use super::message::{FromPlant, LONGEST_LINE, PROTOCOL, Row, ToPlant};
 use super::recorder::Recorder;
-use super::wire::Wire;
+use super::wire::{MOST_WAITING, Wire};
 
 /// What the plant is told of who asks.
 const PROGRAM: &str = concat!("residyn ", env!("CARGO_PKG_VERSION"));
@@ -21,6 +21,8 @@ const GREETING: Duration = Duration::from_secs(60);
 const RESETTING: Duration = Duration::from_secs(300);
 /// A step of a slow simulator.
 const STEPPING: Duration = Duration::from_secs(30);
+/// Bytes of a number, with what separates it from the next.
+const LONGEST_NUMBER: usize = 32;
 /// Commands that are remembered until rows say when they acted.
 const REMEMBERED: usize = 4096;
 
@@ -55,10 +57,13 @@ impl Lateness {
 
 struct Sent {
     id: u64,
-    command: Vec<f64>,
+    /// For each period in which nothing newer arrives; the last is held.
+    commands: Vec<Vec<f64>>,
     /// The period of the row that it answers.
     answers: usize,
     has_acted: bool,
+    /// Periods of it that plans know of.
+    told: usize,
 }
 
 struct Episode {
@@ -72,8 +77,11 @@ struct Episode {
     id: u64,
     /// Messages with rows so far.
     periods: usize,
-    /// Periods beyond one in the last step.
-    late: usize,
+    begun: Instant,
+    step_s: f64,
+    patience: usize,
+    /// Periods that plans expect until a command acts.
+    expected: usize,
     recorder: Option<Recorder>,
 }
 
@@ -147,7 +155,10 @@ impl Remote {
             sent: VecDeque::new(),
             id: 0,
             periods: 0,
-            late: 0,
+            begun: Instant::now(),
+            step_s: self.description.step_s,
+            patience: self.description.patience,
+            expected: self.lateness.latency(),
             recorder: recorder.transpose()?,
             row: Row {
                 time: f64::NEG_INFINITY,
@@ -180,37 +191,48 @@ impl Remote {
         Ok(())
     }
 
-    fn send_step(&mut self, command: &[f64]) -> Result<Vec<f64>, RemoteError> {
-        if let Some(joint) = command.iter().position(|value| !value.is_finite()) {
-            let value = command[joint];
-            self.wire.close();
-            return Err(RemoteError::Command {
-                joint: joint + 1,
-                value,
-            });
-        }
+    fn send_step(&mut self, command: &[f64], next: &[Vec<f64>]) -> Result<Held, RemoteError> {
+        self.refuse_infinite(command, next)?;
         let answers = self.episode.as_ref().expect("it has begun").periods;
         self.catch_up()?;
+        // A line has room for them.
+        let most = (self.description.next).min(LONGEST_LINE / (LONGEST_NUMBER * command.len()) / 2);
         let episode = self.episode.as_mut().expect("it has begun");
-        let (q, qd) = episode.state.split_at(command.len());
-        let sent = episode.guard.admit(command, q, qd);
+        let late = episode.periods - answers;
+        // The plan counts on what acts now, and goes on after the periods that passed without it.
+        let next = next.get(late..).unwrap_or_default();
+        let commands = episode.admit(command, &next[..next.len().min(most)], late);
+        let [sent, next @ ..] = commands.as_slice() else {
+            unreachable!("a command and those after it")
+        };
         episode.id += 1;
         let id = episode.id;
-        self.wire.send(&ToPlant::Step { id, command: &sent })?;
-        episode.sent.push_back(Sent {
+        self.wire.send(&ToPlant::Step {
             id,
-            command: sent.clone(),
-            answers,
-            has_acted: false,
-        });
-        if episode.sent.len() > REMEMBERED {
-            episode.sent.pop_front();
-        }
+            command: sent,
+            next,
+        })?;
+        let held = Held {
+            sent: sent.clone(),
+            steps: episode.sent_late(commands, answers, late),
+        };
         self.await_rows(id)?;
-        let episode = self.episode.as_mut().expect("it has begun");
-        episode.late = episode.periods - answers - 1;
-        self.lateness.late += episode.late;
-        Ok(sent)
+        self.lateness.late += late;
+        Ok(held)
+    }
+
+    /// What is not a number is not sent, nor is anything else any more.
+    fn refuse_infinite(&mut self, command: &[f64], next: &[Vec<f64>]) -> Result<(), RemoteError> {
+        let joints = command.len();
+        let mut values = command.iter().chain(next.iter().flatten()).enumerate();
+        let Some((place, value)) = values.find(|(_, value)| !value.is_finite()) else {
+            return Ok(());
+        };
+        self.wire.close();
+        Err(RemoteError::Command {
+            joint: place % joints + 1,
+            value: *value,
+        })
     }
 
     /// Rows that came while the command was computed: the plant did not wait.
@@ -240,9 +262,12 @@ impl Remote {
         let joints = self.description.joints.len();
         let episode = self.episode.as_mut().expect("it has begun");
         episode.periods += 1;
+        if let Some(fault) = episode.flood(self.description.clock) {
+            return Err(refused(&self.wire, fault));
+        }
         for row in rows {
             let fault = row.fault(joints, Some(episode.row.time));
-            let fault = fault.or_else(|| episode.fault_of_id(row.command));
+            let fault = fault.or_else(|| episode.fault_of_command(&row));
             if let Some(fault) = fault {
                 return Err(refused(&self.wire, fault));
             }
@@ -265,10 +290,85 @@ impl Remote {
     }
 }
 
+impl Sent {
+    /// What acts after so many periods in which nothing newer arrived.
+    fn after(&self, periods: usize) -> &[f64] {
+        &self.commands[periods.min(self.commands.len() - 1)]
+    }
+}
+
 impl Episode {
-    fn fault_of_id(&self, id: u64) -> Option<String> {
-        let is_known = self.sent.iter().any(|sent| sent.id == id);
-        (!is_known && id != 0).then(|| format!("command {id} was not sent"))
+    /// What may be sent, `late` periods after the one that is answered.
+    fn admit(&mut self, command: &[f64], next: &[Vec<f64>], late: usize) -> Vec<Vec<f64>> {
+        if late > 0 {
+            let applied = self.in_silence(late);
+            self.guard.applied(applied);
+        }
+        let (q, qd) = self.state.split_at(command.len());
+        let sent = self.guard.admit(command, q, qd);
+        let next = self.guard.continued(next);
+        [vec![sent], next].concat()
+    }
+
+    /// Remember what is sent. Returns a command for each period that passed, in the order in which they act: those of before for as
+    /// many periods as are later than plans expect, then the new ones.
+    fn sent_late(&mut self, commands: Vec<Vec<f64>>, answers: usize, late: usize) -> Vec<Vec<f64>> {
+        let before = late.saturating_sub(self.expected.saturating_sub(1));
+        let mut steps = self.tell(before);
+        self.sent.push_back(Sent {
+            id: self.id,
+            commands,
+            answers,
+            has_acted: false,
+            told: 0,
+        });
+        if self.sent.len() > REMEMBERED {
+            self.sent.pop_front();
+        }
+        steps.extend(self.tell(1 + late - before));
+        steps
+    }
+
+    /// The newest command's next so many periods.
+    fn tell(&mut self, periods: usize) -> Vec<Vec<f64>> {
+        let told = self.sent.back().map_or(0, |sent| sent.told);
+        if let Some(sent) = self.sent.back_mut() {
+            sent.told += periods;
+        }
+        (told..told + periods)
+            .map(|period| self.in_silence(period))
+            .collect()
+    }
+
+    /// What acts so many periods after the newest command began to act, if nothing newer arrives.
+    fn in_silence(&self, periods: usize) -> Vec<f64> {
+        let newest = self.sent.back().filter(|_| periods < self.patience);
+        newest
+            .map_or(self.safe.as_slice(), |sent| sent.after(periods))
+            .to_vec()
+    }
+
+    fn fault_of_command(&self, row: &Row) -> Option<String> {
+        let id = row.command;
+        let sent = self.sent.iter().find(|sent| sent.id == id);
+        let next = match sent {
+            None if id == 0 => 0,
+            None => return Some(format!("command {id} was not sent")),
+            Some(sent) => sent.commands.len() - 1,
+        };
+        (row.ahead > next).then(|| format!("command {id} has {next} next ones, not {}", row.ahead))
+    }
+
+    /// Rows in more messages than a clock allows: what is read for ever is never answered.
+    fn flood(&self, clock: Clock) -> Option<String> {
+        let elapsed_s = self.begun.elapsed().as_secs_f64();
+        let most = MOST_WAITING as f64 + 2.0 * elapsed_s / self.step_s;
+        (clock == Clock::Wall && self.periods as f64 > most).then(|| {
+            format!(
+                "{} messages with rows came within {elapsed_s:.1} s, but a step takes {} s",
+                self.periods, self.step_s
+            )
+        })
     }
 
     /// A row that is right. Returns the latency of the command that acted up to it, if it is the first such row.
@@ -292,7 +392,7 @@ impl Episode {
             self.periods.saturating_sub(sent.answers + 1)
         });
         if let Some(recorder) = &mut self.recorder {
-            let command = acted.map_or(&self.safe, |sent| &sent.command);
+            let command = acted.map_or(self.safe.as_slice(), |sent| sent.after(row.ahead));
             recorder.row(&row, command)?;
         }
         self.row = row;
@@ -327,12 +427,8 @@ impl Driven for Remote {
         self.description.safe.clone()
     }
 
-    fn step(&mut self, command: &[f64]) -> Result<Vec<f64>, DriveError> {
-        Ok(self.send_step(command)?)
-    }
-
-    fn late(&self) -> usize {
-        self.episode.as_ref().map_or(0, |episode| episode.late)
+    fn step(&mut self, command: &[f64], next: &[Vec<f64>]) -> Result<Held, DriveError> {
+        Ok(self.send_step(command, next)?)
     }
 }
 
@@ -342,3 +438,6 @@ fn refused(wire: &Wire, fault: String) -> RemoteError {
         fault,
     }
 }
+
+#[cfg(test)]
+mod tests;

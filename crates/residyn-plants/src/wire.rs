@@ -10,7 +10,7 @@ use super::error::RemoteError;
 use super::message::{FromPlant, LONGEST_LINE, ToPlant};
 
 /// Lines that wait to be read. A plant that sends more has to wait.
-const MOST_WAITING: usize = 1024;
+pub(super) const MOST_WAITING: usize = 1024;
 /// How long a plant may take to end after it was told to stop.
 const ENDING: Duration = Duration::from_secs(2);
 const CONNECTING: Duration = Duration::from_secs(5);

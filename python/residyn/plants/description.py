@@ -44,7 +44,9 @@ def description(plant: Plant) -> Mapping[str, Any]:
         "safe": safe_command(plant).tolist(),
         "measured": list(plant.measured),
     }
-    return {**message, "patience": plant.patience} if plant.clock == "wall" else message
+    # In the period after these, the watchdog acts.
+    by_itself = {"patience": plant.patience, "next": plant.patience - 1}
+    return {**message, **by_itself} if plant.clock == "wall" else message
 
 
 def _check(plant: Plant) -> None:

@@ -9,7 +9,7 @@ from .description import safe_command
 from .guard import Guard
 from .messages import Malformed, Reset, Step
 from .plant import Array, Plant, PlantError, Row
-from .record import Record
+from .record import SAFE, Acting, Record
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -22,7 +22,7 @@ class SimulatedEpisode:
         self._guard = Guard(plant, safe_command(plant))
         self._record = Record(plant, self._guard)
         self._steps = 0
-        self.first: Rows = [self._record.entry(plant.reset(reset.seed, reset.start), 0.0, 0)]
+        self.first: Rows = [self._record.entry(plant.reset(reset.seed, reset.start), 0.0, SAFE)]
 
     def take(self, step: Step) -> Rows:
         """Do a step."""
@@ -32,7 +32,8 @@ class SimulatedEpisode:
         self._steps = step.id
         # Rows without a time are evenly spaced.
         apart_s = self._plant.step_s / len(rows)
-        return [self._record.entry(row, begun_s + k * apart_s, step.id) for k, row in enumerate(rows, start=1)]
+        acted = Acting(step.id)
+        return [self._record.entry(row, begun_s + k * apart_s, acted) for k, row in enumerate(rows, start=1)]
 
     def due_s(self) -> float | None:
         """The plant waits for the host."""
@@ -44,7 +45,8 @@ class SimulatedEpisode:
 
 
 class WallEpisode:
-    """An episode of a plant that moves by itself: every period the newest command is applied, and rows are sent."""
+    """An episode of a plant that moves by itself: every period the newest command or, in the periods after it, the next of those
+    that came with it, is applied, and rows are sent."""
 
     def __init__(self, plant: Plant, reset: Reset) -> None:
         self._plant = plant
@@ -56,8 +58,8 @@ class WallEpisode:
         self._period = 1
         self._newest: Step | None = None
         self._arrived = 0
-        self._in_force = 0
-        self.first: Rows = [self._record.entry(first, 0.0, 0)]
+        self._in_force = SAFE
+        self.first: Rows = [self._record.entry(first, 0.0, SAFE)]
 
     def take(self, step: Step) -> Rows:
         """Keep the newest command for the end of the period."""
@@ -82,11 +84,13 @@ class WallEpisode:
 
     def _next_command(self) -> Array:
         # The watchdog: whatever became of the host, its last command is not held for ever.
-        if self._newest is None or self._period - self._arrived >= self._plant.patience:
-            self._in_force = 0
+        silent = self._period - self._arrived
+        if self._newest is None or silent >= self._plant.patience:
+            self._in_force = SAFE
             return self._guard.rest()
-        self._in_force = self._newest.id
-        return self._guard.admit(self._newest.command)
+        commands = [self._newest.command, *self._newest.next]
+        self._in_force = Acting(self._newest.id, min(silent, len(commands) - 1))
+        return self._guard.admit(commands[self._in_force.ahead])
 
 
 Episode = SimulatedEpisode | WallEpisode

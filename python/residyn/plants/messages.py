@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -45,10 +45,12 @@ class Step:
     Attributes:
         id: counts up from 1 within an episode.
         command: of each joint, shape (joints,).
+        next: commands for the periods after it, while nothing newer has come, each of shape (joints,).
     """
 
     id: int
     command: Array
+    next: Sequence[Array] = ()
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ def parse(line: bytes, joints: int) -> Message:
             seed = _integer(message, "seed", 0)
             return Reset(seed, None if start is None else _numbers("start", start, 2 * joints))
         case "step":
-            return Step(_integer(message, "id", 1), _numbers("command", message.get("command"), joints))
+            command = _numbers("command", message.get("command"), joints)
+            return Step(_integer(message, "id", 1), command, _next(message.get("next", []), joints))
         case "stop":
             return Stop()
         case other:
@@ -121,6 +124,12 @@ def _integer(message: Mapping[str, Any], name: str, least: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= LARGEST_INTEGER:
         raise Malformed(f'"{name}" is an integer from {least} to {LARGEST_INTEGER}, not {_shown(value)}')
     return value
+
+
+def _next(commands: object, joints: int) -> Sequence[Array]:
+    if not isinstance(commands, list):
+        raise Malformed(f'"next" is a list of commands, not {_shown(commands)}')
+    return [_numbers("next", command, joints) for command in commands]
 
 
 def _numbers(name: str, values: object, count: int) -> Array:

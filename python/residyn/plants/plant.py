@@ -47,7 +47,8 @@ class Plant:
         command: what a command is: a torque in N m (or N), or a position in rad (or m).
         clock: "simulated": moves only in `step`; "wall": moves by itself, and `step` is called every `step_s`.
         safe: the command that is safe to hold; by default no torque.
-        patience: periods of silence after which a plant on the wall clock gets its safe command.
+        patience: periods of silence after which a plant on the wall clock gets its safe command; until then it gets those that
+            the host sent ahead.
         measured: names of further values in rows.
     """
 

@@ -1,12 +1,29 @@
 """The rows of an episode, checked before they are sent."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy
 
 from .guard import Guard
 from .plant import Array, Numbers, Plant, PlantError, Row
+
+
+@dataclass(frozen=True)
+class Acting:
+    """What acts on a plant.
+
+    Attributes:
+        id: of the command; 0 for the safe one.
+        ahead: how many of its next ones were applied since.
+    """
+
+    id: int
+    ahead: int = 0
+
+
+SAFE = Acting(0)
 
 
 class Record:
@@ -17,13 +34,13 @@ class Record:
         self._guard = guard
         self._time = -numpy.inf
 
-    def entry(self, row: Row, handed_over_s: float, in_force: int) -> Mapping[str, Any]:
+    def entry(self, row: Row, handed_over_s: float, in_force: Acting) -> Mapping[str, Any]:
         """A row of a message.
 
         Args:
             row: as the plant returned it.
             handed_over_s: time of a row that has none, s since the reset.
-            in_force: id of the command that acted up to the row.
+            in_force: what acted up to the row.
 
         Raises:
             PlantError: a number that is not finite, of the wrong shape or under an unknown name; time that does not increase.
@@ -34,7 +51,9 @@ class Record:
         optional = {"qd": qd, "tau": tau}
         entry: dict[str, Any] = {"time": time, "q": q.tolist()}
         entry |= {name: values.tolist() for name, values in optional.items() if values is not None}
-        entry["command"] = in_force
+        entry["command"] = in_force.id
+        if in_force.ahead:
+            entry["ahead"] = in_force.ahead
         return {**entry, "measured": self._further(row.measured)} if row.measured else entry
 
     def _later(self, time: float) -> float:

@@ -14,9 +14,14 @@ pub trait Policy {
     /// then velocities); `None` if there is none to be trusted: the plant then holds its safe one.
     fn torque(&mut self, measured: &[f64], time_s: f64) -> Option<Vec<f64>>;
 
-    /// This was sent to the plant, whose limits may have changed it, and was held for so many steps: more than one if the
-    /// plant did not wait.
-    fn sent(&mut self, _torque: &[f64], _steps: usize) {}
+    /// The torques of the steps after the one that was just decided, as far as they are known before anything else is measured.
+    fn ahead(&self) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
+    /// The plant holds these, each for a step, in this order: what was decided, which its limits may have changed, or several if
+    /// it did not wait.
+    fn held(&mut self, _torques: &[Vec<f64>]) {}
 }
 
 /// An episode of plans in which no candidate has a finite return.
@@ -37,7 +42,10 @@ pub struct Controller<'p, 'r> {
     /// Follows the states of the model's effects.
     observer: Option<Environment<'r>>,
     replan: usize,
+    /// The steps to be executed before the next plan.
     plan: VecDeque<Vec<f64>>,
+    /// The steps after them, for a plant that does not wait for the next plan.
+    rest: VecDeque<Vec<f64>>,
     /// Steps since the plan was made.
     executed: usize,
     /// The last torques, as many as the model's delays need.
@@ -65,6 +73,7 @@ impl<'p, 'r> Controller<'p, 'r> {
             observer,
             replan,
             plan: VecDeque::new(),
+            rest: VecDeque::new(),
             executed: 0,
             past: VecDeque::new(),
             at: (Vec::new(), 0.0),
@@ -121,8 +130,12 @@ impl<'p, 'r> Controller<'p, 'r> {
         let plan = self.planner.plan(Start::after(&state, time_s, carried));
         self.decisions += 1;
         self.diverged += plan.diverged;
+        self.rest.clear();
         match plan.best.is_finite() {
-            true => self.plan = plan.inputs.into_iter().take(self.replan).collect(),
+            true => {
+                self.plan = plan.inputs.into();
+                self.rest = self.plan.split_off(self.replan.min(self.plan.len()));
+            }
             false => self.lost.push(time_s),
         }
     }
@@ -137,13 +150,18 @@ impl Policy for Controller<'_, '_> {
         self.plan.pop_front()
     }
 
-    fn sent(&mut self, torque: &[f64], steps: usize) {
-        if let Some(observer) = &mut self.observer {
+    fn ahead(&self) -> Vec<Vec<f64>> {
+        self.plan.iter().chain(&self.rest).cloned().collect()
+    }
+
+    fn held(&mut self, torques: &[Vec<f64>]) {
+        if let (Some(observer), Some(torque)) = (&mut self.observer, torques.last()) {
             let (measured, time_s) = &self.at;
             observer.step(&mut measured.clone(), torque, *time_s);
         }
-        self.plan.drain(..self.plan.len().min(steps - 1));
-        for _ in 0..steps {
+        let late = torques.len().saturating_sub(1);
+        self.plan.drain(..self.plan.len().min(late));
+        for torque in torques {
             self.hold(torque);
         }
     }

@@ -21,15 +21,31 @@ pub trait Driven {
     /// The torque or command to hold where no better one is known.
     fn safe(&self) -> Vec<f64>;
 
-    /// Hold a torque or command for a step; returns the one that the plant was sent, which its limits may have changed.
+    /// Hold a torque or command for a step. A plant that does not wait goes on with `next`, one a step, until it is sent another
+    /// command.
     ///
     /// # Errors
     /// A plant that diverges, or that no longer does what it is told.
-    fn step(&mut self, command: &[f64]) -> Result<Vec<f64>, DriveError>;
+    fn step(&mut self, command: &[f64], next: &[Vec<f64>]) -> Result<Held, DriveError>;
+}
 
-    /// Steps beyond one that passed in the last step, since the plant does not wait for a command.
-    fn late(&self) -> usize {
-        0
+/// What became of a command.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Held {
+    /// The command that the plant was sent, which its limits may have changed.
+    pub sent: Vec<f64>,
+    /// A command for each step that passed, in the order in which they act: the one that was sent alone, unless the plant did not
+    /// wait for it.
+    pub steps: Vec<Vec<f64>>,
+}
+
+impl Held {
+    /// By a plant that waits, for one step.
+    pub fn for_a_step(command: &[f64]) -> Self {
+        Self {
+            sent: command.to_vec(),
+            steps: vec![command.to_vec()],
+        }
     }
 }
 
@@ -70,8 +86,8 @@ impl<R: Rng> Driven for Simulated<'_, R> {
         vec![0.0; self.rig.joints()]
     }
 
-    fn step(&mut self, command: &[f64]) -> Result<Vec<f64>, DriveError> {
+    fn step(&mut self, command: &[f64], _: &[Vec<f64>]) -> Result<Held, DriveError> {
         self.rig.step(command)?;
-        Ok(command.to_vec())
+        Ok(Held::for_a_step(command))
     }
 }

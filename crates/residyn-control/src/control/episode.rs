@@ -55,9 +55,9 @@ pub fn drive(
     for _ in 0..steps {
         let row = Row::of(plant);
         let command = policy.torque(&row.measured, row.time_s);
-        let sent = plant.step(&command.unwrap_or_else(|| plant.safe()))?;
-        policy.sent(&sent, 1 + plant.late());
-        stretch.push(row, &sent);
+        let held = plant.step(&command.unwrap_or_else(|| plant.safe()), &policy.ahead())?;
+        policy.held(&held.steps);
+        stretch.push(row, &held.sent);
     }
     // No command in the last row.
     let (row, idle) = (Row::of(plant), vec![0.0; stretch.log.joints()]);

@@ -16,6 +16,10 @@ pub fn with_controller<R>(
     lead: impl FnOnce(&mut Controller<'_, '_>) -> R,
 ) -> R {
     let rollouts = predictor.rollouts(&task.objective(), task.step_s);
+    let rollouts = match task.bounds.excess(task.joints()) {
+        Some(excess) => rollouts.within(excess.program()),
+        None => rollouts,
+    };
     let planner = Planner::new(&task.planner, &task.torque, || rollouts.block(), rng);
     let observer = predictor.observer(task.step_s);
     planner.with_workers(|| lead(&mut Controller::new(&planner, &rollouts, observer, replan)))

@@ -5,6 +5,7 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::Bounds;
 use crate::plan::{Objective, Settings};
 use residyn_core::limits::{LOG_ROWS, check_readings};
 use residyn_core::model::Dynamics;
@@ -44,6 +45,9 @@ pub struct Task {
     pub goal: Goal,
     #[serde(default)]
     pub plant: PlantSettings,
+    /// What plans keep the state within as far as they can; the plant says so, not the file.
+    #[serde(skip)]
+    pub bounds: Bounds,
     /// Where it was read from.
     #[serde(skip)]
     pub path: PathBuf,

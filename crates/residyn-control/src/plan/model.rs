@@ -40,4 +40,8 @@ impl Evaluate for Block<'_> {
         } = start;
         Block::returns(self, state, *time_s, carried, inputs, returns);
     }
+
+    fn excess(&self) -> Option<&Rows> {
+        Block::excess(self)
+    }
 }

@@ -4,7 +4,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::method::Search;
 use super::noise::Noise;
-use super::population::Population;
+use super::population::{Evaluated, Population};
 use super::proposal::Proposal;
 use super::settings::{Settings, Size};
 use residyn_core::lanes::{Arch, WorkerPool};
@@ -18,6 +18,11 @@ pub trait Evaluate: Send {
     /// The return of each candidate of a block from `start` under `inputs` (`[step * n + input]`); NaN or infinite if
     /// the rollout diverges.
     fn returns(&mut self, start: &Self::Start, inputs: &[Rows], returns: &mut Rows);
+
+    /// How far each of the candidates that were evaluated last goes beyond limits, 0 within; `None` without limits.
+    fn excess(&self) -> Option<&Rows> {
+        None
+    }
 }
 
 /// A search for the inputs that maximise a return, by the [`Method`](super::Method) of its settings or a [`Search`] of
@@ -26,7 +31,7 @@ pub trait Evaluate: Send {
 /// Plan repeatedly within [`Planner::with_workers`] to use all cores.
 ///
 /// Candidates are clipped to the bounds before they are evaluated. The result is the same on any number of processor
-/// cores: each block of candidates has its own random stream.
+/// cores: each block of candidates has its own random stream. Candidates beyond limits rank below all within.
 pub struct Planner<E: Evaluate> {
     search: Arc<dyn Search>,
     size: Size,
@@ -53,7 +58,8 @@ struct Candidates<E> {
 pub struct Plan {
     /// `[step][input]`
     pub inputs: Vec<Vec<f64>>,
-    /// The best return of a candidate in the last iteration; minus infinity if all of them diverged.
+    /// The best value of a candidate in the last iteration, the return if any keeps the limits; minus infinity if all of them
+    /// diverged.
     pub best: f64,
     /// Number of candidates, over all iterations, whose return was not finite; they rank last.
     pub diverged: usize,
@@ -145,7 +151,11 @@ impl<E: Evaluate> Planner<E> {
             let tasks = self.blocks.len();
             self.pool.run(tasks, &|index| self.draw_and_evaluate(index));
             let blocks: Vec<_> = self.blocks.iter().map(lock).collect();
-            let evaluated = blocks.iter().map(|b| (b.inputs.as_slice(), &b.returns));
+            let evaluated = blocks.iter().map(|block| Evaluated {
+                inputs: &block.inputs,
+                returns: &block.returns,
+                excess: block.evaluate.excess(),
+            });
             let population = Population::new(evaluated, self.size.population);
             let mut proposal = write(&self.proposal);
             self.search.learn(&population, &mut proposal);

@@ -146,7 +146,7 @@ impl Run<'_> {
         for log in before {
             for row in 0..log.rows() - 1 {
                 let held: Vec<f64> = log.tau.iter().map(|tau| tau[row]).collect();
-                plant.step(&held)?;
+                plant.step(&held, &[])?;
             }
         }
         let Some(last) = before.last().filter(|_| self.plant.description().is_some()) else {

@@ -15,6 +15,8 @@ pub struct Rollouts {
     program: Program,
     parameters: Vec<f32>,
     networks: Vec<Added>,
+    /// The output that says how far the state is beyond limits, if there are any: the last.
+    excess: Option<usize>,
     /// Present if the equations filter their torques, or these act later.
     memory: Option<Memory>,
     integrator: Integrator,
@@ -44,6 +46,8 @@ pub struct Block<'r> {
     values: Vec<[Vec<Rows>; 2]>,
     /// Filtered torques, `[step * n + joint]`; unused without filters.
     acting: Vec<Rows>,
+    /// Sums over the steps of each rollout; unused without limits.
+    excess: Rows,
 }
 
 impl Rollouts {
@@ -71,9 +75,35 @@ impl Rollouts {
             program: whole(equations, networks, objective),
             parameters: equations.values().iter().map(|x| *x as f32).collect(),
             networks: added(equations.layout(), networks),
+            excess: None,
             memory: Memory::new(equations, step_s),
             integrator,
             step_s: step_s as f32,
+        }
+    }
+
+    /// The same for a plant with limits: `excess` says how far a state is beyond them, 0 within. It is a program with the inputs
+    /// of an objective and one output; [`Block::excess`] has its sums.
+    ///
+    /// # Panics
+    /// When `excess` does not match the joints.
+    #[must_use]
+    pub fn within(self, excess: &Program) -> Self {
+        let mut graph = Graph::new();
+        let names = self.program.inputs().iter();
+        let inputs: Vec<Node> = names.map(|name| graph.input(name)).collect();
+        let mut outputs = graph.append(&self.program, &inputs);
+        let (layout, joints) = (self.layout, self.joints());
+        let until_now = &inputs[layout.parameters()..][..joints];
+        let motion = &inputs[..layout.internal().start];
+        let of_state = [motion, until_now, &[inputs[layout.time()]]].concat();
+        let place = outputs.len();
+        outputs.extend(graph.append(excess, &of_state));
+        assert_eq!(outputs.len(), place + 1, "an excess is one number");
+        Self {
+            program: graph.finish(&outputs),
+            excess: Some(place),
+            ..self
         }
     }
 
@@ -123,6 +153,7 @@ impl Rollouts {
             rates: states(),
             values: self.networks.iter().map(values).collect(),
             acting: Vec::new(),
+            excess: Rows::splat(0.0),
         }
     }
 }
@@ -203,6 +234,11 @@ impl Block<'_> {
         });
         self.acting = filtered;
     }
+
+    /// How far each of the last rollouts went beyond the limits, summed over the ends of its steps; `None` without limits.
+    pub fn excess(&self) -> Option<&Rows> {
+        self.rollouts.excess.map(|_| &self.excess)
+    }
 }
 
 struct Run<'a, 'r> {
@@ -232,6 +268,7 @@ impl WithSimd for Run<'_, '_> {
             block.tape.moving()[layout.step()] = Rows::splat(h);
         }
         *returns = Rows::splat(0.0);
+        block.excess = Rows::splat(0.0);
         for step in 0..=steps {
             block.hold(inputs, self.acting, step);
             for substep in 0..substeps {
@@ -244,6 +281,9 @@ impl WithSimd for Run<'_, '_> {
                     block.tape.run_on(simd);
                     if k == 0 && substep == 0 && step > 0 {
                         add(simd, returns, block.tape.output(layout.states().len()), 1.0);
+                        if let Some(output) = block.rollouts.excess {
+                            add(simd, &mut block.excess, block.tape.output(output), 1.0);
+                        }
                         if step == steps {
                             return;
                         }

@@ -19,6 +19,8 @@ pub struct Session {
     pub truths: Vec<Plant>,
     /// What is controlled, one for each case.
     pub plants: Vec<Controlled>,
+    /// The task within the limits of the plant, one for each case.
+    pub tasks: Vec<Task>,
     /// The backend that hybrids are trained on.
     pub backend: Backend,
     /// The first of the consecutive seeds.
@@ -60,23 +62,25 @@ impl Session {
         let truths: Vec<Plant> = (experiment.cases.iter())
             .map(truth)
             .collect::<Result<_, _>>()?;
-        let plant = |(case, truth): (&Case, &Plant)| -> Result<Controlled, ExperimentError> {
-            let Some(place) = &case.plant else {
-                return Ok(truth.clone().into());
+        let plant =
+            |(case, truth): (&Case, &Plant)| -> Result<(Controlled, Task), ExperimentError> {
+                let mut same = task.clone();
+                let Some(place) = &case.plant else {
+                    return Ok((truth.clone().into(), same));
+                };
+                let plant = Controlled::open(place, Some(&experiment.path), &library, reach)?;
+                let bound = plant.bound(&mut same, &declared);
+                let fault = match bound {
+                    Ok(()) if same.torque == task.torque => return Ok((plant, same)),
+                    Ok(()) => "its limits are narrower than `torque` of the task".to_owned(),
+                    Err(unsuited) => unsuited.to_string(),
+                };
+                Err(experiment.wrong(format!("case `{}`: {fault}", case.name)))
             };
-            let plant = Controlled::open(place, Some(&experiment.path), &library, reach)?;
-            let mut same = task.clone();
-            let bound = plant.bound(&mut same, &declared);
-            let fault = match bound {
-                Ok(()) if same.torque == task.torque => return Ok(plant),
-                Ok(()) => "its limits are narrower than `torque` of the task".to_owned(),
-                Err(unsuited) => unsuited.to_string(),
-            };
-            Err(experiment.wrong(format!("case `{}`: {fault}", case.name)))
-        };
-        let plants = (experiment.cases.iter().zip(&truths))
+        let plants: Vec<(Controlled, Task)> = (experiment.cases.iter().zip(&truths))
             .map(plant)
             .collect::<Result<_, _>>()?;
+        let (plants, tasks) = plants.into_iter().unzip();
         Ok(Self {
             experiment,
             library,
@@ -84,6 +88,7 @@ impl Session {
             task,
             truths,
             plants,
+            tasks,
             backend,
             first_seed,
         })

@@ -168,7 +168,7 @@ impl Session {
 
     fn evaluator(&self, case: usize, seed: u64) -> Evaluator<'_> {
         Evaluator {
-            task: &self.task,
+            task: &self.tasks[case],
             plant: &self.plants[case],
             seed,
         }
