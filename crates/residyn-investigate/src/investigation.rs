@@ -221,7 +221,8 @@ impl Investigation<'_> {
     fn close(&self, logs: &[Log], watch: &dyn Watch) -> Result<Outcome, InvestigateError> {
         let run = logs.len();
         let split = Split::of(logs.to_vec(), &Settings::default().split);
-        let request = Request::new(self.model, self.library, split);
+        let model = self.model.for_sent_torques();
+        let request = Request::new(&model, self.library, split);
         let mut rng = stream(self.seed, Draws::Other(1_000_000 + run));
         let closed = close_loop(request, &mut rng, &Closing(watch));
         closed.map_err(|source| InvestigateError::Study { run, source })

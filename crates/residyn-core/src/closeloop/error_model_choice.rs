@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::fit::NOTHING;
 use super::problem::Problem;
-use super::select::{baseline_friction, usual_forces};
+use super::select::baseline_friction;
 use crate::data::statistics::{mean, upper_median};
 use crate::data::{Log, Quantity, Smoothing};
 use crate::identify::{Window, cut, fit_torques, has_torques};
-use crate::model::Model;
+use crate::model::{FittedEffect, Model};
 use crate::sim::FIT_S;
 use crate::sim::metric::{errors_in, torque_error};
 
@@ -64,10 +64,10 @@ impl Problem<'_> {
         windows.into_iter().step_by(every.max(1)).collect()
     }
 
-    /// What the declared model with the usual forces, fitted to the torques, leaves of each joint's; `None` if torques
-    /// cannot be compared.
-    pub(super) fn torques_left(&self) -> Option<Vec<f64>> {
-        let effects = [self.declared.effects.as_slice(), &usual_forces(self)].concat();
+    /// What the declared model with these effects beside its own, fitted to the torques, leaves of each joint's; `None` if
+    /// torques cannot be compared.
+    pub(super) fn torques_left(&self, beside: &[FittedEffect]) -> Option<Vec<f64>> {
+        let effects = [self.declared.effects.as_slice(), beside].concat();
         let model = self.smoothed(&self.declared.with_effects(effects));
         let fitted = fit_torques(self.solver, &model, self.declared, self.logs).ok()?;
         Some(fitted.shooting.noise)

@@ -2,6 +2,7 @@
 //! force.
 
 use super::problem::Problem;
+use super::select::usual_forces;
 use crate::data::statistics::sample_deviation;
 use crate::data::{Quantity, Smooth, half_width_s};
 use crate::identify::{Window, initial_state};
@@ -44,7 +45,7 @@ impl Problem<'_> {
     /// What the declared model with the usual forces, fitted to the torques, leaves of their standard deviation on the
     /// joint on which it leaves most; `None` if torques cannot be compared.
     fn left_of_torques(&self) -> Option<f64> {
-        let left = self.torques_left()?;
+        let left = self.torques_left(&usual_forces(self))?;
         let share = |(joint, left): (usize, &f64)| {
             let torque = self.logs.iter().flat_map(|log| &log.tau[joint]);
             left / sample_deviation(&torque.copied().collect::<Vec<f64>>())

@@ -5,10 +5,11 @@ use rayon::prelude::*;
 use super::error_model::ErrorModel;
 use super::prepare::{Prepared, ReadyLogs};
 use super::problem::Problem;
-use super::select::usual_forces;
+use super::select::{forces_and_rotors, usual_forces};
 use crate::data::statistics::mean;
 use crate::data::torque_column::share_of_held;
 use crate::data::{Finding, Log, Quantity, Severity, TorqueColumn};
+use crate::model::FittedEffect;
 
 /// The torques of all logs are of one kind, and this many logs suffice to show which.
 const FEW: usize = 3;
@@ -65,21 +66,33 @@ fn read_as<C: FromIterator<Log>>(logs: &[Log], column: TorqueColumn) -> C {
 }
 
 impl Problem<'_> {
-    /// What the torques are, by what the declared model with the usual friction leaves unexplained of the motion or of the
-    /// torques, whichever shows it more clearly.
+    /// What the torques are, if the declared model says the same with the usual forces and with rotors as well: of a rotor that
+    /// the file lacks the joint seems to respond at another time.
     fn torque_column(&self) -> TorqueColumn {
+        let found = self.torque_column_beside(&usual_forces(self));
+        let is_held = found == TorqueColumn::Held;
+        let is_sure = |found| self.torque_column_beside(&forces_and_rotors(self)) == found;
+        match is_held || is_sure(found) {
+            true => found,
+            false => TorqueColumn::Held,
+        }
+    }
+
+    /// What the torques are, by what the declared model with these effects leaves unexplained of the motion or of the torques,
+    /// whichever shows it more clearly.
+    fn torque_column_beside(&self, effects: &[FittedEffect]) -> TorqueColumn {
         let logs = &self.logs[..FEW.min(self.logs.len())];
         let with = |column| read_as::<Vec<Log>>(logs, column);
         let all = TorqueColumn::ALL.map(|column| (column, with(column)));
-        let left = |measure: fn(&Problem<'_>) -> Option<f64>| {
+        let left = |measure: &(dyn Fn(&Problem<'_>) -> Option<f64> + Sync)| {
             let of = |(_, logs): &(TorqueColumn, Vec<Log>)| measure(&self.on(logs));
             all.par_iter().map(of).collect::<Vec<_>>()
         };
         let by_motion = match self.declared.joints > self.settings.fit.most_joints_by_motion {
             true => Vec::new(),
-            false => left(|problem| problem.motion_noise()),
+            false => left(&|problem| problem.motion_noise(effects)),
         };
-        let by_torques = left(|problem| problem.torque_noise());
+        let by_torques = left(&|problem| problem.torque_noise(effects));
         let share = |left: &Vec<Option<f64>>| share_of_held(left).map_or(1.0, |(share, _)| share);
         let clearer = match share(&by_motion) < share(&by_torques) {
             true => by_motion,
@@ -88,16 +101,16 @@ impl Problem<'_> {
         TorqueColumn::clearest(&clearer, self.settings.fit.other_torque_share)
     }
 
-    /// What the declared model with the usual friction and a constant torque leaves of the motion; `None` if it diverges.
-    fn motion_noise(&self) -> Option<f64> {
-        let fitted = self.fitted_beside(&self.started_from(), &usual_forces(self));
+    /// What the declared model with these effects leaves of the motion; `None` if it diverges.
+    fn motion_noise(&self, effects: &[FittedEffect]) -> Option<f64> {
+        let fitted = self.fitted_beside(&self.started_from(), effects);
         Some(fitted.ok()?.fit.scale)
     }
 
     /// What the same model leaves of the torques: the geometric mean over the joints. `None` if
     /// it gives accelerations, or diverges.
-    fn torque_noise(&self) -> Option<f64> {
-        let logarithms = self.torques_left()?.into_iter().map(f64::ln);
+    fn torque_noise(&self, effects: &[FittedEffect]) -> Option<f64> {
+        let logarithms = self.torques_left(effects)?.into_iter().map(f64::ln);
         Some(mean(&logarithms.collect::<Vec<f64>>()).exp())
     }
 }

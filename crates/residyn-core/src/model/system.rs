@@ -14,7 +14,7 @@ use super::measured_in_file::MeasuredQuantity;
 use super::reader::Located;
 use super::tree::{Body, Recovered};
 use crate::data::statistics::mean;
-use crate::data::{Columns, Joint, Log, LogError, Quantity};
+use crate::data::{Columns, Joint, Log, LogError, Quantity, TorqueColumn};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
 /// Speed over which dry friction reverses (rad/s or m/s), unless the file or a fit to logs sets another one.
@@ -223,6 +223,15 @@ impl Model {
             effects,
             ..self.clone()
         }
+    }
+
+    /// The same model for logs whose torques are those that a host sent, and so held from their rows on, unless its file says what
+    /// they are.
+    #[must_use]
+    pub fn for_sent_torques(&self) -> Self {
+        let mut model = self.clone();
+        model.columns.torque.get_or_insert(TorqueColumn::Held);
+        model
     }
 
     /// The same model with dry friction that reverses over these speeds (rad/s or m/s), one per joint; 0 for a jump.

@@ -1,5 +1,5 @@
 use crate::closeloop::problem::Problem;
-use crate::model::{Effect, FittedEffect};
+use crate::model::{Effect, Entry, FittedEffect};
 
 use super::candidate::acting;
 
@@ -26,6 +26,13 @@ pub fn baseline_friction(problem: &Problem<'_>) -> Vec<FittedEffect> {
 pub fn usual_forces(problem: &Problem<'_>) -> Vec<FittedEffect> {
     let sets = baseline_sets(problem).into_iter();
     sets.take(2).next_back().unwrap_or_default()
+}
+
+/// These and the inertias that most machines have beside those of their links, without delays.
+pub fn forces_and_rotors(problem: &Problem<'_>) -> Vec<FittedEffect> {
+    let mut all = baseline_sets(problem).pop().unwrap_or_default();
+    all.retain(|own| matches!(own.effect.entry, Entry::Force(_) | Entry::Inertia(_)));
+    all
 }
 
 /// The baseline sets, which most machines have, each on all joints together: if every joint has friction, adding it to

@@ -23,7 +23,7 @@ mod simpler;
 mod tests;
 mod trial;
 
-pub(super) use self::baseline::{baseline_friction, usual_forces};
+pub(super) use self::baseline::{baseline_friction, forces_and_rotors, usual_forces};
 pub use self::candidate::candidates;
 pub(super) use self::candidate::{acting, best_start, is_of_too_many, screened_cost, starts};
 pub(super) use self::evidence::{f_test, gain, p_of_gains, p_value, p_value_by};

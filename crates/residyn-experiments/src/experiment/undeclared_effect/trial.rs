@@ -190,7 +190,8 @@ impl Session {
 
     fn close(&self, logs: &[Log], seed: u64) -> Result<Outcome, StudyError> {
         let split = Split::of(logs.to_vec(), &Settings::default().split);
-        let request = Request::new(&self.declared, &self.library, split);
+        let declared = self.declared.for_sent_torques();
+        let request = Request::new(&declared, &self.library, split);
         let mut rng = stream(seed, Purpose::Other(logs.len()));
         close_loop(request, &mut rng, &())
     }
