@@ -13,6 +13,7 @@ use super::elsewhere::Elsewhere;
 use super::excite::read_limits;
 use super::{Answer, Common, inputs, interrupt, progress, terminal};
 use residyn_core::closeloop::{Progress, Stage};
+use residyn_core::data::{Joint, Quantity};
 use residyn_core::model::{Call, Model, Origin};
 use residyn_excite::Limits;
 use residyn_investigate::{
@@ -237,7 +238,7 @@ fn headline(found: &Investigated) -> String {
         Ended::OutOfMotion => "the motion is used up",
     };
     format!(
-        "{} after {:.0} s of motion; {end}",
+        "found {} after {:.0} s of motion; {end}",
         answer(last),
         last.motion_s
     )
@@ -273,7 +274,7 @@ fn table(rounds: &[Round]) -> String {
             round.rms
         );
     }
-    out
+    out + "\nErrors are root mean squares of the open-loop error over half a second, in rad (m of joints that slide).\n"
 }
 
 /// Where the model was tested, in Markdown.
@@ -281,16 +282,25 @@ fn region(region: &Region, model: &Model) -> String {
     let mut out = String::from(
         "\nThe model was tested in this region, and nothing is known of it outside:\n\n| joint | position | speed | driven by |\n|---|---|---|---|\n",
     );
-    let span = |[low, high]: Span| format!("{low:.3} to {high:.3}");
-    for (joint, angle) in residyn_core::data::Joint::all(model.joints).zip(&region.angle) {
+    let span = |[low, high]: Span, unit: &str| format!("{low:.3} to {high:.3}{unit}");
+    for (joint, angle) in Joint::all(model.joints).zip(&region.angle) {
         let at = joint.index();
+        let [length, speed, force] = match model.prismatic[joint] {
+            true => [" m", " m/s", " N"],
+            false => [" rad", " rad/s", " N m"],
+        };
+        // A command is in the unit of its drive.
+        let driven = match model.driven_by() {
+            Quantity::Torque => force,
+            _ => "",
+        };
         let _ = writeln!(
             out,
             "| {} | {} | {} | {} |",
             model.joint_label(joint),
-            span(*angle),
-            span(region.speed[at]),
-            span(region.driven[at])
+            span(*angle, length),
+            span(region.speed[at], speed),
+            span(region.driven[at], driven)
         );
     }
     out
