@@ -282,25 +282,19 @@ fn region(region: &Region, model: &Model) -> String {
     let mut out = String::from(
         "\nThe model was tested in this region, and nothing is known of it outside:\n\n| joint | position | speed | driven by |\n|---|---|---|---|\n",
     );
-    let span = |[low, high]: Span, unit: &str| format!("{low:.3} to {high:.3}{unit}");
     for (joint, angle) in Joint::all(model.joints).zip(&region.angle) {
         let at = joint.index();
-        let [length, speed, force] = match model.prismatic[joint] {
-            true => [" m", " m/s", " N"],
-            false => [" rad", " rad/s", " N m"],
-        };
-        // A command is in the unit of its drive.
-        let driven = match model.driven_by() {
-            Quantity::Torque => force,
-            _ => "",
+        let span = |[low, high]: Span, of: Quantity| {
+            let text = format!("{low:.3} to {high:.3} {}", model.columns.unit(of, joint));
+            text.trim_end().to_owned()
         };
         let _ = writeln!(
             out,
             "| {} | {} | {} | {} |",
             model.joint_label(joint),
-            span(*angle, length),
-            span(region.speed[at], speed),
-            span(region.driven[at], driven)
+            span(*angle, Quantity::Angle),
+            span(region.speed[at], Quantity::Velocity),
+            span(region.driven[at], model.driven_by())
         );
     }
     out

@@ -103,22 +103,14 @@ fn slope(effect: &FittedEffect, of: usize) -> f64 {
 mod tests {
     use super::{p_of_excess, simplified};
     use crate::closeloop::select::Trial;
-    use crate::closeloop::tests::{Study, pendulum};
+    use crate::closeloop::tests::{FAST_PENDULUM, Study, pendulum};
     use crate::data::Joint;
     use crate::identify::uncertainty;
     use crate::model::{FittedEffect, Library};
 
-    const RIG: &str = r#"
-model = "pendulum"
-parameters = { C_g = -17.4, C_i = 4.6 }
-sensor = { rate_hz = 200, position_noise = 2e-4, position_step = 0.0 }
-excitation = { amplitude = [1.6], band_hz = [0.15, 3.0], tones = 10 }
-recording = { logs = 3, duration_s = 6, start = [0, 0] }
-"#;
-
     /// The probability of the excess over dry friction, and what takes its place.
     fn judged(hidden: &str) -> (f64, Option<String>) {
-        let study = Study::of(pendulum(), &[RIG, hidden].concat());
+        let study = Study::of(pendulum(), &[FAST_PENDULUM, hidden].concat());
         let declared = study.fitted();
         let problem = &declared.problem;
         let stribeck = Library::built_in()

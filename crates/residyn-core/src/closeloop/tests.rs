@@ -40,6 +40,15 @@ excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
 recording = { logs = 3, duration_s = 8, start = [0, 0] }
 "#;
 
+/// A pendulum that is logged at 200 Hz in three faster motions.
+pub(super) const FAST_PENDULUM: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 200, position_noise = 2e-4, position_step = 0.0 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 3.0], tones = 10 }
+recording = { logs = 3, duration_s = 6, start = [0, 0] }
+"#;
+
 const FRICTION: &str = r#"effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.2 }]"#;
 
 /// Logs, and the model and the library that they are studied with.

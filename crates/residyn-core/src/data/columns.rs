@@ -92,7 +92,7 @@ impl Columns {
 
     /// The unit of a joint's angle or length, velocity, or torque or force; none for a command, nor for what is not a
     /// joint's.
-    pub(crate) fn unit(&self, quantity: Quantity, joint: Joint) -> &'static str {
+    pub fn unit(&self, quantity: Quantity, joint: Joint) -> &'static str {
         let slides = self.slides.get(joint.index()).copied().unwrap_or(false);
         let [of_turning, of_sliding] = match quantity {
             Quantity::Time => ["s", "s"],

@@ -8,7 +8,7 @@ use super::screening::Screening;
 use super::simpler::{parts, repaired, simpler};
 use super::trial::Trial;
 use crate::closeloop::fit::Declared;
-use crate::closeloop::tests::{Study, absent, pendulum};
+use crate::closeloop::tests::{FAST_PENDULUM, Study, absent, pendulum};
 use crate::model::{FittedEffect, Library, Side};
 
 #[test]
@@ -224,18 +224,13 @@ fn simpler_sets_hold_no_effect_twice() {
 /// the numbers next to its present one.
 #[test]
 fn exchanges_start_near_what_they_replace() {
-    const RIG: &str = r#"
-model = "pendulum"
-parameters = { C_g = -17.4, C_i = 4.6 }
-sensor = { rate_hz = 200, position_noise = 2e-4, position_step = 0.0 }
-excitation = { amplitude = [1.6], band_hz = [0.15, 3.0], tones = 10 }
-recording = { logs = 3, duration_s = 6, start = [0, 0] }
+    const HIDDEN: &str = r#"
 effect = [
     { name = "actuator_lag", joint = 1, T = 0.03 },
     { name = "cogging_torque", joint = 1, A = 0.3, N = 7, phase = 0.4 },
 ]
 "#;
-    let study = Study::of(pendulum(), RIG);
+    let study = Study::of(pendulum(), &[FAST_PENDULUM, HIDDEN].concat());
     let Declared { problem, fitted } = study.fitted();
     let mut ripple = absent("cogging_torque");
     ripple.values = vec![(0.1, None), (6.0, None), (0.4, None)];
