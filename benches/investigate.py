@@ -28,23 +28,24 @@ Hidden = dict[int, dict[str, float]]
 
 @dataclass(frozen=True)
 class Link:
-    """Mass in kg, length in m, axis of the joint, greatest torque in N m."""
+    """Mass in kg, length in m, axis of the joint, greatest torque in N m, inertia of the rotor behind its gear in kg m^2."""
 
     mass: float
     length: float
     axis: str
     torque: float
+    rotor: float = 0.0
 
 
 ONE = (Link(0.8, 0.5, "0 1 0", 6),)
 TWO = (Link(1.2, 0.45, "0 1 0", 20), Link(0.7, 0.4, "0 1 0", 6))
 SIX = (
-    Link(3, 0.2, "0 0 1", 60),
-    Link(3, 0.4, "0 1 0", 60),
-    Link(2, 0.35, "0 1 0", 30),
-    Link(1, 0.1, "0 0 1", 10),
-    Link(0.7, 0.1, "0 1 0", 6),
-    Link(0.3, 0.08, "0 0 1", 3),
+    Link(3, 0.2, "0 0 1", 60, 0.5),
+    Link(3, 0.4, "0 1 0", 60, 0.5),
+    Link(2, 0.35, "0 1 0", 30, 0.2),
+    Link(1, 0.1, "0 0 1", 10, 0.05),
+    Link(0.7, 0.1, "0 1 0", 6, 0.05),
+    Link(0.3, 0.08, "0 0 1", 3, 0.02),
 )
 
 
@@ -67,7 +68,7 @@ class Rig:
         """The description of a rig that hides this."""
         body = ""
         for number, link in reversed(list(enumerate(self.links, 1))):
-            values = hidden.get(number, {})
+            values = {"armature": link.rotor} | hidden.get(number, {})
             attributes = "".join(f' {key}="{value}"' for key, value in values.items())
             if "frictionloss" in values:
                 # As stiff as the time step allows: softer friction acts some milliseconds ahead of the velocity.

@@ -273,6 +273,28 @@ fn an_investigation_names_what_a_rig_hides_and_is_found_again() {
     assert_eq!(before, after);
 }
 
+/// A pendulum whose declared model knows no gravity falls out of the motion that it is to follow.
+#[test]
+fn a_rig_that_runs_away_from_its_motion_is_left_to_its_safe_command() {
+    let scratch = Scratch::new();
+    scratch.file(
+        "declared.toml",
+        "[system]\nname = \"pendulum\"\njoints = 1\n[parameters]\nJ = { value = 1 }\n\
+         [dynamics]\nmass = [[\"J\"]]\nbias = [\"0\"]\n",
+    );
+    scratch.file(
+        "limits.toml",
+        "step_s = 0.01\n[[joint]]\nangle = [-2.0, 2.0]\nspeed = 0.3\nacceleration = 2.0\ntorque = 0.2\nstart = 1.5\n\
+         torque_noise = 0.01\nencoder_noise = 1e-4\n",
+    );
+    let said = scratch.refuses(
+        "investigate --plant pendulum --model declared.toml --limits limits.toml --motion 8s --out x",
+    );
+    assert!(said.contains("run 1: joint 1 moved at "), "{said}");
+    assert!(said.contains(" where the limits allow 0.3"), "{said}");
+    assert!(!scratch.has("x/rounds.jsonl"));
+}
+
 #[test]
 fn every_experiment_on_plants_in_other_processes_can_be_read() {
     let entries = fs::read_dir(ours("configs/elsewhere")).unwrap();

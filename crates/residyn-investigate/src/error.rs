@@ -6,6 +6,8 @@ use residyn_io::WriteLogError;
 use residyn_io::runs::RunFolderError;
 use thiserror::Error;
 
+use super::runaway::Runaway;
+
 /// Why an investigation cannot go on.
 #[derive(Debug, Error)]
 pub enum InvestigateError {
@@ -41,6 +43,12 @@ pub enum InvestigateError {
         "joint {joint} does not follow its motor in the model; a motion of every joint can be designed only where each has a motor"
     )]
     NoMotor { joint: usize },
+    #[error(
+        "run {run}: joint {} moved at {:.1} where the limits allow {}, and the plant was told its safe command; the model is too far from the rig to be \
+         followed: close the loop on a log of a small motion first, or begin with lower limits",
+        runaway.joint, runaway.speed, runaway.limit
+    )]
+    RanAway { run: usize, runaway: Runaway },
     #[error(
         "{motion_s} s of motion are less than a run of {run_s} s; allow more motion, or shorter runs"
     )]

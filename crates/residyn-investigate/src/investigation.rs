@@ -196,26 +196,18 @@ impl Investigation<'_> {
         let design = &choice.design;
         let start: Vec<f64> = design.q.iter().map(|q| q[0]).collect();
         let tracking = match self.plant.driven_by() {
-            Quantity::Command => Tracking::none(self.model.joints),
+            Quantity::Command => Tracking::Plant,
             _ => Tracking::of(self.model, &start)?,
         };
-        let speeds = self
-            .limits
-            .joints
-            .iter()
-            .map(|joint| 0.5 * joint.speed)
-            .collect();
-        let mut follow = Follow::new(design, tracking, speeds);
+        let mut follow = Follow::new(design, tracking, self.limits);
         let noise = stream(self.seed, Draws::Gather(run));
         let seed = plant_seed(&stream(self.seed, Draws::Start(run)));
         let how = (start.as_slice(), design.duration_s, design.step_s);
-        Ok(play(
-            self.plant,
-            &mut follow,
-            how,
-            (seed, noise),
-            &kept.log(run),
-        )?)
+        let log = play(self.plant, &mut follow, how, (seed, noise), &kept.log(run))?;
+        match follow.runaway() {
+            Some(runaway) => Err(InvestigateError::RanAway { run, runaway }),
+            None => Ok(log),
+        }
     }
 
     fn close(&self, logs: &[Log], watch: &dyn Watch) -> Result<Outcome, InvestigateError> {

@@ -9,7 +9,9 @@ mod kept;
 mod play;
 mod region;
 mod round;
+mod runaway;
 mod tracking;
+mod within;
 
 pub use choice::{Choice, Choose, Designed, Purpose, Random};
 pub use error::InvestigateError;
@@ -17,4 +19,5 @@ pub use follow::Follow;
 pub use investigation::{Ended, Investigated, Investigation, Watch};
 pub use region::{Region, Span};
 pub use round::{Named, Round};
-pub use tracking::Tracking;
+pub use runaway::Runaway;
+pub use tracking::{Reference, Tracking};

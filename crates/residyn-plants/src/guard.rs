@@ -1,4 +1,4 @@
-use super::description::{Commanded, Description};
+use super::description::{Commanded, Description, Limits};
 
 /// Keeps the commands that the host sends within the limits of a plant, which does the same once more.
 ///
@@ -7,22 +7,45 @@ use super::description::{Commanded, Description};
 /// limit. A torque then stays on the safe torque's other side, a commanded position on the measured one's. Braking may
 /// exceed the rate.
 pub struct Guard {
-    description: Description,
+    limits: Limits,
+    command: Commanded,
+    safe: Vec<f64>,
+    step_s: f64,
     last: Vec<f64>,
 }
 
 impl Guard {
-    /// For an episode in which nothing was commanded yet, from the measured positions `q`.
+    /// For an episode of a plant in which nothing was commanded yet, from the measured positions `q`.
     pub fn new(description: &Description, q: &[f64]) -> Self {
-        let from = match description.command {
-            Commanded::Torque => &description.safe,
+        let Description {
+            limits,
+            command,
+            safe,
+            step_s,
+            ..
+        } = description;
+        Self::within(limits.clone(), (*command, safe), *step_s, q)
+    }
+
+    /// For limits of one's own, with the kind of the commands, the one that is safe to hold, and how long each is held.
+    pub fn within(
+        limits: Limits,
+        (command, safe): (Commanded, &[f64]),
+        step_s: f64,
+        q: &[f64],
+    ) -> Self {
+        let from = match command {
+            Commanded::Torque => safe,
             // The first command is no jump, wherever the safe one is.
             Commanded::Position => q,
         };
-        let from = from.iter().zip(&description.limits.command);
+        let from = from.iter().zip(&limits.command);
         Self {
             last: from.map(|(at, range)| clip(*at, *range)).collect(),
-            description: description.clone(),
+            limits,
+            command,
+            safe: safe.to_vec(),
+            step_s,
         }
     }
 
@@ -53,12 +76,12 @@ impl Guard {
     }
 
     fn admit_one(&self, joint: usize, asked: f64, q: f64, qd: f64) -> f64 {
-        let Description {
+        let Self {
             limits,
             command,
             safe,
             ..
-        } = &self.description;
+        } = self;
         let speed = limit(&limits.speed, joint);
         let angle = limits.angle.as_ref().and_then(|list| list[joint]);
         let [low, high] = angle.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
@@ -79,7 +102,7 @@ impl Guard {
 
     /// Within range, and within rate of the command before.
     fn clipped(&self, joint: usize, asked: f64, last: f64) -> f64 {
-        let Description { limits, step_s, .. } = &self.description;
+        let Self { limits, step_s, .. } = self;
         let change = limit(&limits.rate, joint) * step_s;
         clip(
             clip(asked, limits.command[joint]),

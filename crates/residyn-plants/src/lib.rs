@@ -16,4 +16,5 @@ pub use controlled::{Beginning, Controlled, ControlledError, Simulation, Unsuite
 pub use description::{Clock, Commanded, Description, Limits};
 pub use error::RemoteError;
 pub use fleet::Fleet;
+pub use guard::Guard;
 pub use remote::{Lateness, Remote};

@@ -11,6 +11,7 @@ use super::effect::{Effect, Entry, PLACE, RATIO};
 use super::filter::Filter;
 use super::fitted::FittedEffect;
 use super::internal_state::{InternalStates, mean_rates};
+use super::inverse_dynamics::InverseDynamics;
 use super::reader::Located;
 use super::system::{Model, Motion};
 use crate::data::{Joint, NOMINAL, Quantity};
@@ -213,25 +214,31 @@ impl Model {
     /// The inertia that each joint has for its torque while the others are free (kg m^2 or kg), from the declared equations
     /// at rest with all angles at zero.
     pub fn joint_inertias(&self) -> Vec<f64> {
-        self.joint_inertias_at(&vec![0.0; self.joints])
+        let still = vec![0.0; self.joints];
+        let declared = self.with_effects(Vec::new());
+        let (_, mobility) = declared.inverse_dynamics().forward(&still, &still);
+        mobility.diagonal().iter().map(|of| of.recip()).collect()
     }
 
-    /// The same at these angles.
-    pub fn joint_inertias_at(&self, q: &[f64]) -> Vec<f64> {
+    /// The torques that accelerate the joints as wanted, without the lag of states that effects have of their own.
+    pub fn inverse_dynamics(&self) -> InverseDynamics {
         let sign = self.sign();
-        let mut assembly = Assembly::new(self, &[], &sign);
+        let mut assembly = Assembly::new(self, &self.effects, &sign);
         assembly.apply_drive();
+        let torques = assembly.tau.clone();
+        assembly.apply_torque_effects();
+        assembly.apply_forces();
         let accelerations = assembly.accelerations();
-        let mobility = Joint::all(self.joints)
-            .map(|joint| assembly.mobility(joint, accelerations[joint]))
+        let slopes = (accelerations.iter())
+            .flat_map(|of| assembly.slopes(*of, &torques))
             .collect::<Vec<Node>>();
-        let program = assembly.graph.finish(&mobility);
+        let outputs = [accelerations, slopes].concat();
+        let program = assembly.graph.finish(&outputs);
         let layout = self.layout();
         let mut inputs = vec![0.0; layout.time() + 1];
-        inputs[..q.len()].copy_from_slice(q);
         inputs[layout.driving().end..layout.time()].fill(NOMINAL);
         inputs.extend(self.values());
-        program.eval(&inputs).into_iter().map(f64::recip).collect()
+        InverseDynamics::new(program, inputs, self.joints)
     }
 
     /// Every parameter of the model: the declared ones, then those of the effects, in their order.
@@ -623,11 +630,10 @@ impl<'a> Assembly<'a> {
         self.solved(&matrix, &bias)
     }
 
-    /// How much a joint accelerates for each N m of its torque.
-    fn mobility(&mut self, joint: Joint, acceleration: Node) -> Node {
+    /// How much an acceleration changes for each N m of these torques.
+    fn slopes(&mut self, acceleration: Node, torques: &[Node]) -> Vec<Node> {
         let one = self.graph.constant(1.0);
-        let torque = self.tau[joint];
-        self.graph.gradient(&[acceleration], &[one], &[torque])[0]
+        self.graph.gradient(&[acceleration], &[one], torques)
     }
 
     /// Mass matrix and bias, inertia of effects included; `None` for a model that gives accelerations.

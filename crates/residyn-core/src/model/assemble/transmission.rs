@@ -139,7 +139,7 @@ impl Assembly<'_> {
             has_sensor,
             ..
         } = self.motors[motor];
-        let of_link = self.mobility(joint, before[joint]);
+        let of_link = self.slopes(before[joint], &[self.tau[joint]])[0];
         let graph = &mut self.graph;
         let [zero, one] = [0.0, 1.0].map(|value| graph.constant(value));
         let of_motor = graph.div(one, inertia);
