@@ -14,6 +14,17 @@ acceleration = 20.0
 torque = 12.0
 ";
 
+const RIG: &str = "
+[system]
+name = \"joint\"
+joints = 1
+[parameters]
+J = { value = 1.0 }
+[dynamics]
+mass = [[\"J\"]]
+bias = [\"0\"]
+";
+
 #[test]
 fn a_motion_within_limits_is_written_with_what_it_will_tell() {
     let scratch = Scratch::new();
@@ -38,6 +49,24 @@ fn a_motion_within_limits_is_written_with_what_it_will_tell() {
     assert!(scratch.read("motion.svg").contains("<svg"));
     let again = scratch.json(&format!("{line} --alternative coulomb_friction=0.2"));
     assert_eq!(again["design"], found["design"]);
+}
+
+/// States that a saturating motor cannot hold show nothing, and stop nothing.
+#[test]
+fn a_motor_that_saturates_late_is_moved_within_what_it_holds() {
+    let scratch = Scratch::new();
+    scratch.file("limits.toml", LIMITS);
+    let effect =
+        |name: &str, value: &str| format!("[[effect]]\nname = \"{name}\"\njoint = 1\n{value}\n");
+    let late = effect("actuator_delay", "d = 0.01") + &effect("actuator_saturation", "m = 5.0");
+    scratch.file("rig.toml", format!("{RIG}{late}"));
+    let line = "excite --model rig.toml --limits limits.toml --duration 4 --out motion.csv";
+    let found = scratch.json(line);
+    let uses = found["design"]["uses"].as_array().unwrap();
+    assert!(
+        uses.iter().all(|one| one["share"].as_f64().unwrap() <= 1.0),
+        "{uses:?}"
+    );
 }
 
 #[test]

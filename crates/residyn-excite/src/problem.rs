@@ -137,6 +137,23 @@ impl Problem {
         Ok(problem)
     }
 
+    /// Those of some states in which a command holds the model: no motor that saturates pushes harder.
+    fn held(&self, states: Motion) -> Motion {
+        let n = self.joints();
+        let count = states[0].len() / n;
+        let along = self.balance.along(&vec![0.0; count], &states);
+        let entries = along.slopes.len() / count;
+        let of_state = |state: usize| &along.slopes[entries * state..][..entries];
+        let is_held: Vec<bool> = (0..count)
+            .map(|state| of_state(state).iter().all(|slope| slope.is_finite()))
+            .collect();
+        states.map(|channel| {
+            let of_states = channel.chunks(n).zip(&is_held);
+            let held = of_states.filter(|(_, is_held)| **is_held);
+            held.flat_map(|(state, _)| state).copied().collect()
+        })
+    }
+
     /// What random states within the limits show.
     fn base_of_states(&self, limits: &Limits, rng: &mut impl Rng) -> Result<Base, ExciteError> {
         let mut motion: Motion = Default::default();
@@ -153,11 +170,12 @@ impl Problem {
                 }
             }
         }
-        let times = vec![0.0; STATES];
-        let along = self.balance.along(&times, &motion);
-        if !along.slopes.iter().all(|slope| slope.is_finite()) {
+        let motion = self.held(motion);
+        let times = vec![0.0; motion[0].len() / self.joints()];
+        if times.is_empty() {
             return Err(ExciteError::NotFinite);
         }
+        let along = self.balance.along(&times, &motion);
         let all: Vec<usize> = (0..self.parameters.active.len()).collect();
         let regressor = self.regressor(&along, &all);
         Ok(self.parameters.independent(&regressor))
