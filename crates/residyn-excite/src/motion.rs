@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use residyn_core::data::Log;
 use residyn_core::identify::{Shooting, Values, as_it_stands, cut, fit, longest_stable_step};
 use residyn_core::model::{Dynamics, Model};
+use residyn_core::sim::FIT_SCHEME;
 
 use crate::error::ExciteError;
 use crate::limits::Limits;
@@ -28,7 +29,7 @@ fn shooting<'l>(logs: &'l [Log], limits: &Limits, dynamics: &Dynamics) -> Shooti
         .map(|joint| joint.encoder_noise)
         .collect();
     let shooting = Shooting::new(logs, cut(logs, WINDOW_S), &noise);
-    let stable_s = longest_stable_step(&shooting, dynamics);
+    let stable_s = longest_stable_step(&shooting, dynamics, FIT_SCHEME);
     match stable_s < shooting.longest_s() {
         true => shooting.in_steps_of(stable_s),
         false => shooting,

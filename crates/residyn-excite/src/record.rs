@@ -6,7 +6,7 @@ use residyn_core::data::Log;
 use residyn_core::identify::{Shooting, cut, longest_stable_step};
 use residyn_core::limits::is_reading;
 use residyn_core::model::{Dynamics, Model};
-use residyn_core::sim::{Environment, FIT_S, Integrator};
+use residyn_core::sim::{Environment, FIT_S, Integrator, RK4};
 
 use crate::error::ExciteError;
 use crate::motion::WINDOW_S;
@@ -42,7 +42,7 @@ fn longest_s(model: &Model, dynamics: &Dynamics, reference: &Reference) -> f64 {
     };
     let logs = [log];
     let shooting = Shooting::new(&logs, cut(&logs, WINDOW_S), &vec![1.0; model.joints]);
-    FIT_S.min(longest_stable_step(&shooting, dynamics))
+    FIT_S.min(longest_stable_step(&shooting, dynamics, RK4))
 }
 
 /// The motion of a model that follows a reference. Commands of drives are its input as they are; torques drift, so that a

@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use super::error_model::ErrorModel;
 use super::fitted::Fitted;
 use super::plainer::Unused;
 use super::problem::Problem;
@@ -51,8 +52,14 @@ impl Searched<'_> {
 fn simplified(problem: &Problem<'_>, fitted: &Fitted, k: usize) -> Option<Trial> {
     let whole = &fitted.model.effects[k];
     let on = |of: &Trial| of.losses.of_effect(whole).iter().sum::<f64>();
-    let most =
-        (1.0 + problem.settings.select.simpler_rise) * on(&Trial::of(problem, fitted.clone()));
+    let left_out = on(&Trial::of(problem, fitted.clone()));
+    // No block is left out at a smaller loss than it is fitted with; along a value that the logs do not determine, the linearised
+    // one may be.
+    let loss = match problem.error_model {
+        ErrorModel::OutputError => left_out.max(fitted.fit.cost),
+        ErrorModel::InverseDynamics => left_out,
+    };
+    let most = (1.0 + problem.settings.select.simpler_rise) * loss;
     let sets = simpler(problem, &fitted.model.effects, k..k + 1).into_iter();
     let trials = sets.filter_map(|set| {
         let trial = Trial::of(problem, problem.with_effects(fitted, set).ok()?);

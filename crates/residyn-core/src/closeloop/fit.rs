@@ -17,6 +17,7 @@ use crate::identify::{
     longest_stable_step, open, uncertainty,
 };
 use crate::model::{FittedEffect, Library, Model};
+use crate::sim::FIT_SCHEME;
 
 /// The declared model, fitted.
 #[derive(Clone)]
@@ -131,7 +132,7 @@ impl<'a> Problem<'a> {
     /// The same problem in shorter steps, in which a model's friction brings each joint to rest as it should; `None` if
     /// its own are short enough.
     pub(super) fn in_stable_steps(&self, model: &Model) -> Option<Self> {
-        let stable_s = longest_stable_step(&self.shooting, &self.compiled(model));
+        let stable_s = longest_stable_step(&self.shooting, &self.compiled(model), FIT_SCHEME);
         let step_s = stable_s.max(self.settings.fit.shortest_step_s);
         (step_s < self.shooting.longest_s())
             .then(|| self.over(self.shooting.clone().in_steps_of(step_s)))

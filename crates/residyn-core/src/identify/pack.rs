@@ -9,8 +9,8 @@ use crate::data::Log;
 use crate::lanes::Row;
 use crate::model::{Dependence, Dynamics};
 use crate::sim::{
-    Commands, Course, FIT_S, Hold, InternalRates, InternalStart, Point, RK4, Simulator, Window,
-    substeps,
+    Commands, Course, FIT_S, FIT_SCHEME, Hold, InternalRates, InternalStart, Point, Simulator,
+    Window, substeps,
 };
 
 /// What the logs give a model at some values of its parameters: filtered torques, and the course of its internal states
@@ -169,7 +169,7 @@ impl Pack {
         state.extend(self.internal_start(given, &[]).values);
         let commands = &given.commands;
         let model = Point::new(dynamics, values.common.as_slice());
-        let mut simulator = Simulator::<LANES>::new(&model, RK4);
+        let mut simulator = Simulator::<LANES>::new(&model, FIT_SCHEME);
         simulator.state = state;
         values.by_lane(&self.logs, |parameter, lane, value| {
             simulator.set_in_lane(parameter, lane, value);
@@ -225,7 +225,7 @@ impl Pack {
         let (n, columns) = (tangent.joints, tangent.columns());
         let states = self.gather(start_states);
         let mut sums = Sums::new(columns);
-        let mut stepper = TangentStepper::new(tangent, &values.common, RK4);
+        let mut stepper = TangentStepper::new(tangent, &values.common, FIT_SCHEME);
         values.by_lane(&self.logs, |parameter, lane, value| {
             stepper.set_in_lane(parameter, lane, value);
         });

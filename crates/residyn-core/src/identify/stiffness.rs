@@ -7,31 +7,32 @@ use super::values::Values;
 use crate::data::{Log, Measured};
 use crate::lanes::Row;
 use crate::model::Dynamics;
-use crate::sim::{RK4, Window};
+use crate::sim::{Scheme, Window};
 
 /// Of the longest step at which the scheme still follows a decay, this share is used: bodies move, and their inertia
 /// with them.
 const STABLE_SHARE: f64 = 0.7;
 
-/// The longest step in s at which every joint of a model comes to rest as it should, at the places where the windows
-/// begin; infinite without friction.
-pub fn longest_stable_step(shooting: &Shooting<'_>, dynamics: &Dynamics) -> f64 {
+/// The longest step in s at which every joint of a model comes to rest as it should in steps of a scheme, at the places where the
+/// windows begin; infinite without friction.
+pub fn longest_stable_step(shooting: &Shooting<'_>, dynamics: &Dynamics, scheme: &Scheme) -> f64 {
     let values = Values::of(dynamics, shooting.logs);
     let tangent = Tangent::new(dynamics, &[], Local::State);
     let of_some =
-        |windows: &[Window]| fastest_decay(shooting, &tangent, &values, dynamics, windows);
-    let fastest = shooting.windows.chunks(LANES).map(of_some);
-    STABLE_SHARE * RK4.most_damping / fastest.fold(0.0, f64::max)
+        |windows: &[Window]| fastest(shooting, &tangent, &values, dynamics, windows, scheme);
+    let shares = shooting.windows.chunks(LANES).map(of_some);
+    STABLE_SHARE / shares.fold(0.0, f64::max)
 }
 
 /// The largest sum of the rates (1/s) at which the joints' velocities decay at standstill, or swing about the internal
-/// states that hold them: no eigenvalue of the friction exceeds it.
-fn fastest_decay<'l>(
+/// states that hold them, as shares of those that a step of 1 s could follow: no eigenvalue of the friction exceeds it.
+fn fastest<'l>(
     shooting: &Shooting<'l>,
     tangent: &Tangent,
     values: &Values,
     dynamics: &Dynamics,
     windows: &[Window],
+    scheme: &Scheme,
 ) -> f64 {
     let named = |log: &'l Log| Measured::named(&log.measured, dynamics.measured_names());
     let given: Vec<Vec<&Vec<f64>>> = shooting.logs.iter().map(named).collect();
@@ -59,7 +60,13 @@ fn fastest_decay<'l>(
         };
         layout.internal().filter_map(held).sum::<f64>().sqrt()
     };
-    let of_joint = |joint: usize, lane: usize| decay(joint, lane).max(0.0) + swing(joint, lane);
+    let of_joint = |joint: usize, lane: usize| {
+        let decay = decay(joint, lane).max(0.0) / scheme.most_damping;
+        match swing(joint, lane) {
+            0.0 => decay,
+            swing => decay + swing / scheme.most_swing,
+        }
+    };
     let all = |lane: usize| -> f64 { (0..n).map(|joint| of_joint(joint, lane)).sum() };
     (0..LANES).map(all).fold(0.0, f64::max)
 }
@@ -70,6 +77,7 @@ mod tests {
     use crate::data::{Joint, Log};
     use crate::identify::{Shooting, cut};
     use crate::model::{FittedEffect, Library};
+    use crate::sim::RK4;
 
     /// Friction of 0.4 N m that reverses over 1 mrad/s brings an inertia of 1 kg m^2 to rest at 400/s.
     #[test]
@@ -91,7 +99,7 @@ mod tests {
             let model = rig
                 .with_effects(vec![effect])
                 .with_smoothing_velocities(vec![width]);
-            longest_stable_step(&shooting, &model.dynamics())
+            longest_stable_step(&shooting, &model.dynamics(), RK4)
         };
         let usual = step_s(0.4, 1e-3);
         assert!((2e-3..1e-2).contains(&usual), "{usual}");

@@ -18,6 +18,8 @@ pub struct Scheme {
     pub semi_implicit: bool,
     /// Largest decay rate times step length at which the steps decay as well.
     pub most_damping: f64,
+    /// Largest angular frequency times step length at which the steps of a swing without damping do not grow.
+    pub most_swing: f64,
 }
 
 /// One evaluation of the derivative within a step of length h.
@@ -39,6 +41,7 @@ pub const SEMI_IMPLICIT_EULER: &Scheme = &Scheme {
     stages: &stages([0.0], [1.0]),
     semi_implicit: true,
     most_damping: 2.0,
+    most_swing: 2.0,
 };
 
 /// Heun 1900.
@@ -49,6 +52,7 @@ pub const HEUN: &Scheme = &Scheme {
     stages: &stages([0.0, 1.0], [0.5, 0.5]),
     semi_implicit: false,
     most_damping: 2.0,
+    most_swing: 0.0,
 };
 
 /// Kutta 1901.
@@ -62,10 +66,32 @@ pub const RK4: &Scheme = &Scheme {
     ),
     semi_implicit: false,
     most_damping: 2.785,
+    most_swing: 2.828,
+};
+
+/// Order 3 in as many stages as the method of order 4, for friction that brings joints to rest fast: its stability polynomial
+/// 1 + z + z^2/2 + z^3/6 + 0.0252 z^4 stays between 0 and 1 as far as z = -4.13, so that nothing chatters (for such polynomials see van
+/// der Houwen 1977, chapter 2). Of the coefficients that have it those with the least errors of order 4 on a grid of the last two times.
+pub const STABILISED_RK3: &Scheme = &Scheme {
+    name: "stabilised_rk3",
+    title: "stabilised Runge-Kutta method of order 3",
+    order: 3,
+    stages: &stages(
+        [0.0, 0.268_248_206_460_481_835, 0.74, 0.83],
+        [
+            0.100_653_199_921_281_763,
+            0.380_035_168_124_050_858,
+            0.366_360_075_150_647_153,
+            0.152_951_556_804_020_225,
+        ],
+    ),
+    semi_implicit: false,
+    most_damping: 4.13,
+    most_swing: 2.33,
 };
 
 /// Every scheme. A new one is one more entry here.
-pub const SCHEMES: [&Scheme; 3] = [SEMI_IMPLICIT_EULER, HEUN, RK4];
+pub const SCHEMES: [&Scheme; 4] = [SEMI_IMPLICIT_EULER, HEUN, RK4, STABILISED_RK3];
 
 impl Scheme {
     /// The scheme of this name.
@@ -105,7 +131,21 @@ const fn stages<const N: usize>(times: [f64; N], weights: [f64; N]) -> [Stage; N
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Complex;
+
     use super::{SCHEMES, Scheme};
+
+    /// By how much one step of length 1 changes the solution of dx/dt = rate x.
+    fn growth(scheme: &Scheme, rate: Complex<f64>) -> f64 {
+        let one = Complex::new(1.0, 0.0);
+        let (mut inner, mut sum) = (one, one);
+        for stage in scheme.stages {
+            let slope = rate * inner;
+            sum += slope * stage.weight;
+            inner = one + slope * stage.reach;
+        }
+        sum.norm()
+    }
 
     #[test]
     fn the_table_is_consistent() {
@@ -115,6 +155,23 @@ mod tests {
             assert_eq!(scheme.stages[0].time, 0.0, "{}", scheme.name);
             assert!(!scheme.semi_implicit || scheme.stages.len() == 1);
             assert_eq!(Scheme::named(scheme.name), Some(scheme));
+        }
+    }
+
+    /// All rates as far as a limit decay, and those just beyond it do not.
+    #[test]
+    fn steps_decay_as_far_as_their_limits() {
+        for scheme in SCHEMES.into_iter().filter(|scheme| !scheme.semi_implicit) {
+            for (limit, direction) in [
+                (scheme.most_damping, Complex::new(-1.0, 0.0)),
+                (scheme.most_swing, Complex::new(0.0, 1.0)),
+            ] {
+                let at = |share: f64| growth(scheme, direction * share * limit.max(0.01));
+                let inside =
+                    limit > 0.0 && (1..=100).all(|k| at(f64::from(k) / 100.0) <= 1.0 + 1e-9);
+                assert!(inside || limit == 0.0, "{}: {limit}", scheme.name);
+                assert!(at(1.01) > 1.0, "{}: {limit}", scheme.name);
+            }
         }
     }
 }
