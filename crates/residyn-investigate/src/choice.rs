@@ -83,29 +83,41 @@ impl Choose for Designed {
         let is_helpless = !rivals.is_empty();
         if is_helpless && known.runs >= 2 {
             let models: Vec<Model> = rivals.iter().map(|(_, rival)| rival.clone()).collect();
-            let design = known.design(&model, &models, known.limits)?;
-            let told: Vec<Named> = (rivals.into_iter().zip(&design.evidence))
-                .filter(|(_, evidence)| **evidence >= TELLING)
-                .map(|((named, _), _)| named)
-                .collect();
-            if !told.is_empty() {
-                return Ok(Choice {
-                    purpose: Purpose::Tell { from: told },
-                    design,
-                    is_helpless: false,
-                });
+            if let Some(design) = drivable(known.design(&model, &models, known.limits))? {
+                let told: Vec<Named> = (rivals.into_iter().zip(&design.evidence))
+                    .filter(|(_, evidence)| **evidence >= TELLING)
+                    .map(|((named, _), _)| named)
+                    .collect();
+                if !told.is_empty() {
+                    return Ok(Choice {
+                        purpose: Purpose::Tell { from: told },
+                        design,
+                        is_helpless: false,
+                    });
+                }
             }
         }
         let (purpose, limits) = match known.runs % 2 {
             0 => (Purpose::Fast, known.limits.clone()),
             _ => (Purpose::Slow, slower(known.limits)),
         };
-        let design = known.design(&model, &[], &limits)?;
+        let design = match drivable(known.design(&model, &[], &limits))? {
+            Some(design) => design,
+            None => known.design(&known.with_usual_friction(), &[], &limits)?,
+        };
         Ok(Choice {
             purpose,
             design,
             is_helpless,
         })
+    }
+}
+
+/// A design, or `None` where no command drives the model, as within a dead zone that the first runs suggest.
+fn drivable(design: Result<Design, ExciteError>) -> Result<Option<Design>, ExciteError> {
+    match design {
+        Err(ExciteError::NotFinite) => Ok(None),
+        other => other.map(Some),
     }
 }
 
