@@ -4,9 +4,8 @@
 use nalgebra::DMatrix;
 
 use residyn_core::data::Log;
-use residyn_core::identify::{Shooting, Values, as_it_stands, cut, fit, longest_stable_step};
+use residyn_core::identify::{Shooting, Values, as_it_stands, cut, fit, stable_steps};
 use residyn_core::model::{Dynamics, Model};
-use residyn_core::sim::FIT_SCHEME;
 
 use crate::error::ExciteError;
 use crate::limits::Limits;
@@ -29,11 +28,8 @@ fn shooting<'l>(logs: &'l [Log], limits: &Limits, dynamics: &Dynamics) -> Shooti
         .map(|joint| joint.encoder_noise)
         .collect();
     let shooting = Shooting::new(logs, cut(logs, WINDOW_S), &noise);
-    let stable_s = longest_stable_step(&shooting, dynamics, FIT_SCHEME);
-    match stable_s < shooting.longest_s() {
-        true => shooting.in_steps_of(stable_s),
-        false => shooting,
-    }
+    let steps = stable_steps(&shooting, dynamics, 0.0);
+    shooting.in_steps(steps)
 }
 
 /// The information of a log without noise on the free parameters.

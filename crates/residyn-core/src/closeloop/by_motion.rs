@@ -226,8 +226,8 @@ fn fitted_to_motion<T>(
 
 /// Sums of the squared position errors in these windows, one per joint.
 fn squares(problem: &Problem<'_>, model: &Model, windows: &[Window]) -> Vec<f64> {
-    let (dynamics, step_s) = (model.dynamics(), problem.shooting.longest_s());
-    let errors = errors_in(&dynamics, problem.logs, windows, step_s);
+    let (dynamics, steps) = (model.dynamics(), problem.shooting.steps());
+    let errors = errors_in(&dynamics, problem.logs, windows, steps);
     let of_joint = |j: usize| errors.iter().map(|error| error.position[j]).sum();
     (0..model.joints).map(of_joint).collect()
 }

@@ -9,7 +9,7 @@ use crate::data::statistics::{mean, upper_median};
 use crate::data::{Log, Quantity, Smoothing};
 use crate::identify::{Window, cut, fit_torques, has_torques};
 use crate::model::{FittedEffect, Model};
-use crate::sim::FIT_S;
+use crate::sim::Steps;
 use crate::sim::metric::{errors_in, torque_error};
 
 impl Problem<'_> {
@@ -77,7 +77,7 @@ impl Problem<'_> {
     /// over the joints that move at all; `None` if none does.
     fn motion_error(&self, model: &Model) -> Option<f64> {
         let windows = self.some_windows();
-        let errors = errors_in(&model.dynamics(), self.logs, &windows, FIT_S);
+        let errors = errors_in(&model.dynamics(), self.logs, &windows, Steps::FIT);
         let share = |j: usize| {
             let way = |window: &Window| way(&self.logs[window.log], window, j);
             let ways: Vec<f64> = windows.iter().map(way).collect();

@@ -82,13 +82,10 @@ pub(super) struct SetApart {
 impl SetApart {
     pub fn of(problem: &Problem<'_>, fitted: &Fitted, logs: &[Log]) -> Self {
         let dynamics = fitted.model.dynamics();
-        let (horizon_s, step_s) = (
-            problem.settings.score.middle_s(),
-            problem.shooting.longest_s(),
-        );
+        let (horizon_s, steps) = (problem.settings.score.middle_s(), problem.shooting.steps());
         let of_log = |log: &Log| {
             let log = std::slice::from_ref(log);
-            let errors = errors_in(&dynamics, log, &windows(0, &log[0], horizon_s), step_s);
+            let errors = errors_in(&dynamics, log, &windows(0, &log[0], horizon_s), steps);
             errors
                 .iter()
                 .map(|error| error.position.iter().sum())

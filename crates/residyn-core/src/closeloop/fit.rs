@@ -14,10 +14,9 @@ use super::stage::{Stage, Watch};
 use super::start::around;
 use crate::identify::{
     FitError, Identifiability, Open, Shooting, Values, cut, fit_by, fit_torques, identifiability,
-    longest_stable_step, open, uncertainty,
+    open, stable_steps, uncertainty,
 };
 use crate::model::{FittedEffect, Library, Model};
-use crate::sim::FIT_SCHEME;
 
 /// The declared model, fitted.
 #[derive(Clone)]
@@ -132,10 +131,9 @@ impl<'a> Problem<'a> {
     /// The same problem in shorter steps, in which a model's friction brings each joint to rest as it should; `None` if
     /// its own are short enough.
     pub(super) fn in_stable_steps(&self, model: &Model) -> Option<Self> {
-        let stable_s = longest_stable_step(&self.shooting, &self.compiled(model), FIT_SCHEME);
-        let step_s = stable_s.max(self.settings.fit.shortest_step_s);
-        (step_s < self.shooting.longest_s())
-            .then(|| self.over(self.shooting.clone().in_steps_of(step_s)))
+        let shortest_s = self.settings.fit.shortest_step_s;
+        let steps = stable_steps(&self.shooting, &self.compiled(model), shortest_s);
+        (steps != self.shooting.steps()).then(|| self.over(self.shooting.clone().in_steps(steps)))
     }
 
     /// The declared model, fitted to torques, in which it is so nearly linear that no start is poor. The residual of

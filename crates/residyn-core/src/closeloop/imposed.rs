@@ -58,7 +58,7 @@ impl Problem<'_> {
     fn left_of_motion(&self) -> Option<f64> {
         let windows = self.some_windows();
         let dynamics = self.first.as_ref()?.model.dynamics();
-        let errors = errors_in(&dynamics, self.logs, &windows, self.shooting.longest_s());
+        let errors = errors_in(&dynamics, self.logs, &windows, self.shooting.steps());
         let driven: f64 = errors.iter().flat_map(|error| &error.position).sum();
         let uniform = |window: &Window| self.beyond_uniform_motion(window);
         let uniform: f64 = windows.iter().filter_map(uniform).sum();

@@ -283,7 +283,7 @@ fn squares(problem: &Problem<'_>, fitted: &Fitted, logs: &[Log]) -> Vec<f64> {
     let at = |horizon_s: &f64| {
         let of_log = |(k, log): (usize, &Log)| windows(k, log, *horizon_s);
         let windows: Vec<_> = logs.iter().enumerate().flat_map(of_log).collect();
-        let errors = errors_in(&dynamics, logs, &windows, problem.shooting.longest_s());
+        let errors = errors_in(&dynamics, logs, &windows, problem.shooting.steps());
         errors.iter().flat_map(|error| &error.position).sum()
     };
     problem.settings.score.horizons_s.iter().map(at).collect()

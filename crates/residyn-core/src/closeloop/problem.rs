@@ -216,7 +216,7 @@ impl<'a> Problem<'a> {
         let noise = &self.shooting.noise;
         let shooting =
             (self.error_model).shooting(logs, windows, noise, &self.smoothing_velocities);
-        let shooting = shooting.in_steps_of(self.shooting.longest_s());
+        let shooting = shooting.in_steps(self.shooting.steps());
         let same: &Problem<'b> = self;
         Problem {
             logs,

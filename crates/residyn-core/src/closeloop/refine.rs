@@ -103,7 +103,7 @@ impl<'a> Problem<'a> {
     /// to them.
     pub fn refined(&self) -> Self {
         let settings = &self.settings.refine;
-        let longest_s = self.shooting.longest_s();
+        let steps = self.shooting.steps();
         let (step_s, narrower) = (settings.step_s, settings.smoothing_velocity_factor);
         let given = self.declared.smoothing_velocity.as_ref();
         let narrower = given.map_or(narrower, |_| 1.0);
@@ -122,7 +122,7 @@ impl<'a> Problem<'a> {
             shooting: self
                 .shooting
                 .clone()
-                .in_steps_of(step_s.min(narrower * longest_s)),
+                .in_steps(steps.at_most(step_s.min(narrower * steps.longest_s))),
             ..self.clone()
         }
     }

@@ -48,7 +48,7 @@ pub use shooting::Shooting;
 pub(crate) use shooting::rms_by_joint;
 pub use solver::Solver;
 pub use start::start_deviations;
-pub use stiffness::longest_stable_step;
+pub use stiffness::{longest_stable_step, stable_steps};
 pub use sums::huber;
 pub use torques::{TorqueFit, fit_torques, has_torques};
 pub(crate) use values::free_parameters;

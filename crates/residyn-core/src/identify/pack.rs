@@ -9,8 +9,8 @@ use crate::data::Log;
 use crate::lanes::Row;
 use crate::model::{Dependence, Dynamics};
 use crate::sim::{
-    Commands, Course, FIT_S, FIT_SCHEME, Hold, InternalRates, InternalStart, Point, Simulator,
-    Window, substeps,
+    Commands, Course, Hold, InternalRates, InternalStart, Point, Scheme, Simulator, Steps, Window,
+    substeps,
 };
 
 /// What the logs give a model at some values of its parameters: filtered torques, and the course of its internal states
@@ -32,6 +32,7 @@ pub(super) struct Pack {
     time: Vec<Lane>,
     dt: Vec<Lane>,
     substeps: Vec<usize>,
+    scheme: &'static Scheme,
     /// `[row][joint]`
     tau: Vec<Vec<Lane>>,
     pub q: Vec<Vec<Lane>>,
@@ -66,6 +67,7 @@ impl Pack {
             time: vec![Row::splat(0.0); rows],
             dt: vec![Row::splat(0.0); rows],
             substeps: Vec::new(),
+            scheme: Steps::FIT.scheme,
             tau: zeros(),
             q: zeros(),
             weight: zeros(),
@@ -99,7 +101,7 @@ impl Pack {
                 }
             }
         }
-        pack.cut(FIT_S);
+        pack.cut(Steps::FIT);
         pack
     }
 
@@ -108,9 +110,11 @@ impl Pack {
         self.start_weight.fill(Row::splat(0.0));
     }
 
-    /// Cut the steps between rows into substeps of at most `longest_s`.
-    pub fn cut(&mut self, longest_s: f64) {
-        self.substeps = self.dt.iter().map(|dt| substeps(dt, longest_s)).collect();
+    /// Cut the steps between rows into such substeps.
+    pub fn cut(&mut self, steps: Steps) {
+        let of_row = |dt| substeps(dt, steps.longest_s);
+        self.substeps = self.dt.iter().map(of_row).collect();
+        self.scheme = steps.scheme;
     }
 
     fn rows(&self) -> usize {
@@ -169,7 +173,7 @@ impl Pack {
         state.extend(self.internal_start(given, &[]).values);
         let commands = &given.commands;
         let model = Point::new(dynamics, values.common.as_slice());
-        let mut simulator = Simulator::<LANES>::new(&model, FIT_SCHEME);
+        let mut simulator = Simulator::<LANES>::new(&model, self.scheme);
         simulator.state = state;
         values.by_lane(&self.logs, |parameter, lane, value| {
             simulator.set_in_lane(parameter, lane, value);
@@ -225,7 +229,7 @@ impl Pack {
         let (n, columns) = (tangent.joints, tangent.columns());
         let states = self.gather(start_states);
         let mut sums = Sums::new(columns);
-        let mut stepper = TangentStepper::new(tangent, &values.common, FIT_SCHEME);
+        let mut stepper = TangentStepper::new(tangent, &values.common, self.scheme);
         values.by_lane(&self.logs, |parameter, lane, value| {
             stepper.set_in_lane(parameter, lane, value);
         });

@@ -11,7 +11,7 @@ use super::values::{Column, Values};
 use crate::data::{Log, half_width_s};
 use crate::model::{Dynamics, Model};
 use crate::sim::{
-    Case, Commands, Course, FIT_S, InternalRates, LoggedMotion, Point, Window, cut, initial_state,
+    Case, Commands, Course, InternalRates, LoggedMotion, Point, Steps, Window, cut, initial_state,
 };
 
 /// Least squares over windows of logs.
@@ -28,7 +28,7 @@ pub struct Shooting<'l> {
     /// Standard deviation per joint: of the position noise in rad (or m), or of the torque in N m (or N).
     pub noise: Vec<f64>,
     /// The longest step of the integrator, in s.
-    longest_s: f64,
+    steps: Steps,
     measure: Measure,
     prior: Prior,
     /// The same logs cut into windows of other lengths, for each length requested so far: shared by all copies.
@@ -74,7 +74,7 @@ impl<'l> Shooting<'l> {
             logs,
             windows,
             noise: noise.to_vec(),
-            longest_s: FIT_S,
+            steps: Steps::FIT,
             measure,
             prior: Prior::default(),
             cuts: Arc::default(),
@@ -153,9 +153,9 @@ impl<'l> Shooting<'l> {
         };
         other.prior = self.prior.clone();
         other.motions = Arc::clone(&self.motions);
-        match self.longest_s == FIT_S {
+        match self.steps == Steps::FIT {
             true => other,
-            false => other.in_steps_of(self.longest_s),
+            false => other.in_steps(self.steps),
         }
     }
 
@@ -215,18 +215,18 @@ impl<'l> Shooting<'l> {
         residuals as f64 / self.windows.len().max(1) as f64
     }
 
-    /// The longest step of the integrator, in s.
-    pub fn longest_s(&self) -> f64 {
-        self.longest_s
+    /// How motion is integrated.
+    pub fn steps(&self) -> Steps {
+        self.steps
     }
 
-    /// The same windows, integrated in substeps of at most `longest_s`.
+    /// The same windows, integrated in such steps.
     #[must_use]
-    pub fn in_steps_of(mut self, longest_s: f64) -> Self {
-        (self.longest_s, self.cuts) = (longest_s, Arc::default());
+    pub fn in_steps(mut self, steps: Steps) -> Self {
+        (self.steps, self.cuts) = (steps, Arc::default());
         if let Measure::Motion(packs) = &mut self.measure {
             let packs = Arc::make_mut(packs).iter_mut();
-            packs.for_each(|pack| pack.cut(longest_s));
+            packs.for_each(|pack| pack.cut(steps));
         }
         self
     }
@@ -458,7 +458,7 @@ mod tests {
     use crate::identify::sensitivity::{Local, Tangent};
     use crate::identify::{cut, free_parameters};
     use crate::model::{Dynamics, FittedEffect, Library, Model, elastic};
-    use crate::sim::bristles;
+    use crate::sim::{Steps, bristles};
 
     /// Two seconds of an arbitrary motion and torque at 100 Hz.
     fn log() -> Log {
@@ -500,7 +500,7 @@ mod tests {
         let [first, again] = [&shooting, &copy].map(|of| of.cut_into(0.15));
         assert_eq!(first.windows, cut(&logs, 0.15));
         assert!(Arc::ptr_eq(&packs(&first), &packs(&again)));
-        let fine = copy.in_steps_of(1e-3);
+        let fine = copy.in_steps(Steps::FIT.at_most(1e-3));
         assert!(!Arc::ptr_eq(&packs(&shooting), &packs(&fine)));
     }
 

@@ -3,8 +3,36 @@
 use super::scheme::{STABILISED_RK3, Scheme};
 use crate::lanes::Row;
 
-/// How motion is integrated in fits: where friction brings a joint to rest, in half as many steps as by the classical method.
-pub const FIT_SCHEME: &Scheme = STABILISED_RK3;
+/// By which scheme motion is integrated, and in substeps of at most which length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steps {
+    pub scheme: &'static Scheme,
+    /// s
+    pub longest_s: f64,
+}
+
+impl Steps {
+    /// Of fits, where friction does not need shorter ones.
+    pub const FIT: Self = Self {
+        scheme: STABILISED_RK3,
+        longest_s: FIT_S,
+    };
+
+    /// The same in substeps of at most this length.
+    #[must_use]
+    pub fn at_most(self, longest_s: f64) -> Self {
+        Self {
+            longest_s: longest_s.min(self.longest_s),
+            ..self
+        }
+    }
+
+    /// How often the model is evaluated over a step of this length.
+    pub fn evaluations(&self, length_s: f64) -> usize {
+        self.scheme.stages.len() * substeps(&Row([length_s]), self.longest_s)
+    }
+}
+
 /// In fits, and in motions designed for them: at 2 ms Runge-Kutta methods are accurate, and stable with dry friction smoothed to
 /// a fraction of a percent of the top speed.
 pub const FIT_S: f64 = 2e-3;

@@ -34,7 +34,7 @@ pub(in crate::closeloop) fn noise_floor(
         logs,
         &windows,
         &deviations,
-        problem.shooting.longest_s(),
+        problem.shooting.steps(),
     );
     let of_rows: f64 = noise.iter().map(|noise| noise.powi(2)).sum();
     Some((of_starts.powi(2) + of_rows).sqrt())

@@ -58,7 +58,7 @@ fn of_motion(problem: &Problem<'_>, folds: &Folds, trial: &Trial) -> Vec<f64> {
                 &model,
                 &problem.logs[log..=log],
                 &own,
-                problem.shooting.longest_s(),
+                problem.shooting.steps(),
             );
             let squares = errors.iter().map(|error| error.position.iter().sum());
             blocks.into_iter().zip(squares).collect()

@@ -8,7 +8,7 @@ use crate::data::{Log, SAME_S, half_width_s, row_after, row_from};
 use crate::lanes::Row;
 use crate::model::Dynamics;
 use crate::sim::{
-    Commands, PREDICTION_S, Point, RK4, Simulator, Window, initial_state, internal_along,
+    Commands, PREDICTION_S, Point, RK4, Simulator, Steps, Window, initial_state, internal_along,
     with_own_angles,
 };
 
@@ -48,25 +48,29 @@ pub fn assess(dynamics: &Dynamics, logs: &[Log], horizons_s: &[f64]) -> Assessme
 
 /// `replays` has one entry per log.
 fn run(replays: &[Replay<'_>], horizons_s: &[f64], step_s: f64) -> Vec<OpenLoop> {
+    let steps = Steps {
+        scheme: RK4,
+        longest_s: step_s,
+    };
     let one = |&horizon_s: &f64| {
         let logs = replays.iter().map(|replay| replay.log);
         let all: Vec<Window> = all_windows(logs, horizon_s).collect();
         OpenLoop {
             horizon_s,
-            windows: errors(replays, &all, step_s),
+            windows: errors(replays, &all, steps),
         }
     };
     horizons_s.iter().map(one).collect()
 }
 
-/// The errors of a model in some windows, sorted by log, in substeps of at most `step_s`.
+/// The errors of a model in some windows, sorted by log, in such steps.
 pub fn errors_in(
     dynamics: &Dynamics,
     logs: &[Log],
     windows: &[Window],
-    step_s: f64,
+    steps: Steps,
 ) -> Vec<WindowError> {
-    errors(&replays(&in_logs(dynamics, logs), logs), windows, step_s)
+    errors(&replays(&in_logs(dynamics, logs), logs), windows, steps)
 }
 
 /// The model in each log.
@@ -81,14 +85,14 @@ fn replays<'l>(models: &'l [Cow<'_, Dynamics>], logs: &'l [Log]) -> Vec<Replay<'
 }
 
 /// `replays` has one entry per log.
-fn errors(replays: &[Replay<'_>], windows: &[Window], step_s: f64) -> Vec<WindowError> {
+fn errors(replays: &[Replay<'_>], windows: &[Window], steps: Steps) -> Vec<WindowError> {
     let packs: Vec<&[Window]> = windows
         .chunk_by(|a, b| a.log == b.log)
         .flat_map(|of_one_log| of_one_log.chunks(LANES))
         .collect();
     let errors: Vec<Vec<WindowError>> = packs
         .par_iter()
-        .map(|pack| replays[pack[0].log].errors(pack, step_s))
+        .map(|pack| replays[pack[0].log].errors(pack, steps))
         .collect();
     errors.into_iter().flatten().collect()
 }
@@ -176,12 +180,12 @@ impl<'l> Replay<'l> {
         }
     }
 
-    /// The errors of up to [`LANES`] windows of the log, in substeps of at most `step_s`.
-    fn errors(&self, pack: &[Window], step_s: f64) -> Vec<WindowError> {
+    /// The errors of up to [`LANES`] windows of the log, in such steps.
+    fn errors(&self, pack: &[Window], steps: Steps) -> Vec<WindowError> {
         let (log, n) = (self.log, self.model.dynamics.joints);
         let commands = [&self.commands; LANES];
         let lane = |lane: usize| pack[lane.min(pack.len() - 1)];
-        let mut simulator = Simulator::<LANES>::new(&self.model, RK4);
+        let mut simulator = Simulator::<LANES>::new(&self.model, steps.scheme);
         simulator.state = self.starts(pack);
         let mut errors: Vec<WindowError> =
             pack.iter().map(|w| WindowError::none(w, log, n)).collect();
@@ -189,7 +193,7 @@ impl<'l> Replay<'l> {
         for row in 0..rows - 1 {
             let at: [usize; LANES] =
                 std::array::from_fn(|l| (lane(l).first + row).min(lane(l).last - 1));
-            simulator.follow(commands, at, step_s);
+            simulator.follow(commands, at, steps.longest_s);
             let counts = |l: usize| pack[l].first + row < pack[l].last;
             for l in (0..pack.len()).filter(|l| counts(*l)) {
                 errors[l].hold(&mut simulator.state, l);

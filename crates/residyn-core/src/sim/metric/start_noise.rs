@@ -6,26 +6,26 @@ use super::open_loop::Replay;
 use crate::data::Log;
 use crate::lanes::Row;
 use crate::model::Dynamics;
-use crate::sim::{RK4, Simulator, Window};
+use crate::sim::{Simulator, Steps, Window};
 
 /// The first lane has the start state of the log, each of the others one value of it moved.
 const LANES: usize = 8;
 
 /// The open-loop error, root mean square over the rows of the windows with all joints together (rad or m), if each value
 /// of a window's start state is off by a deviation of its own: positions, then velocities, one row of `deviations` a
-/// window. Substeps last at most `step_s`.
+/// window.
 pub fn error_of_starts(
     dynamics: &Dynamics,
     logs: &[Log],
     windows: &[Window],
     deviations: &[Vec<f64>],
-    step_s: f64,
+    steps: Steps,
 ) -> f64 {
     let models: Vec<_> = logs.iter().map(|log| dynamics.in_log(log)).collect();
     let each = models.iter().zip(logs);
     let replays: Vec<Replay<'_>> = each.map(|(model, log)| Replay::new(model, log)).collect();
     let square = |(window, deviations): (&Window, &Vec<f64>)| {
-        replays[window.log].square_of_start(window, deviations, step_s)
+        replays[window.log].square_of_start(window, deviations, steps)
     };
     let squares: Vec<f64> = (windows.par_iter().zip(deviations)).map(square).collect();
     let rows: usize = windows.iter().map(|window| window.rows() - 1).sum();
@@ -34,7 +34,7 @@ pub fn error_of_starts(
 
 impl Replay<'_> {
     /// The square of that error, summed over the rows of a window.
-    fn square_of_start(&self, window: &Window, deviations: &[f64], step_s: f64) -> f64 {
+    fn square_of_start(&self, window: &Window, deviations: &[f64], steps: Steps) -> f64 {
         let start = self.start(window);
         let values: Vec<usize> = (0..deviations.len()).collect();
         let packs = values.chunks(LANES - 1);
@@ -44,7 +44,7 @@ impl Replay<'_> {
                 _ => start[value],
             };
             let states = Row::table(start.len(), state);
-            self.square_of_lanes(window, states, moved.len(), step_s)
+            self.square_of_lanes(window, states, moved.len(), steps)
         };
         packs.map(of_pack).sum()
     }
@@ -55,14 +55,14 @@ impl Replay<'_> {
         window: &Window,
         states: Vec<Row<f64, LANES>>,
         others: usize,
-        step_s: f64,
+        steps: Steps,
     ) -> f64 {
         let commands = [&self.commands; LANES];
-        let mut simulator = Simulator::<LANES>::new(&self.model, RK4);
+        let mut simulator = Simulator::<LANES>::new(&self.model, steps.scheme);
         simulator.state = states;
         let mut sum = 0.0;
         for row in window.first..window.last {
-            simulator.follow(commands, [row; LANES], step_s);
+            simulator.follow(commands, [row; LANES], steps.longest_s);
             let [angles, _] = simulator.shown(commands, [row + 1; LANES]);
             let square = |angle: &Row<f64, LANES>| -> f64 {
                 (1..=others)
@@ -79,7 +79,7 @@ impl Replay<'_> {
 mod tests {
     use std::path::Path;
 
-    use super::{Window, error_of_starts};
+    use super::{Steps, Window, error_of_starts};
     use crate::data::Log;
     use crate::model::Model;
 
@@ -105,7 +105,7 @@ mod tests {
                 &[log.clone()],
                 &[window],
                 &deviations,
-                2e-3,
+                Steps::FIT,
             )
         };
         assert!((error([0.3, 0.0, 0.0, 0.0]) - 0.3).abs() < 1e-12);
