@@ -7,33 +7,17 @@ use super::values::Values;
 use crate::data::{Log, Measured};
 use crate::lanes::Row;
 use crate::model::Dynamics;
-use crate::sim::{STABILISED_RK3, STABILISED_RK3_7, Scheme, Steps, Window};
+use crate::sim::{Scheme, Steps, Window};
 
 /// Of the longest step at which the scheme still follows a decay, this share is used: bodies move, and their inertia
 /// with them.
 const STABLE_SHARE: f64 = 0.7;
 
-/// Of fits, those of fewer stages first.
-const SCHEMES: [&Scheme; 2] = [STABILISED_RK3, STABILISED_RK3_7];
-
-/// The steps of a fit in which every joint of a model comes to rest as it should, with the fewest evaluations: its own if they are
-/// short enough, else no longer ones, and none below `shortest_s`.
+/// The steps of a fit in which every joint of a model comes to rest as it should: its own, or shorter ones, but none below
+/// `shortest_s`.
 pub fn stable_steps(shooting: &Shooting<'_>, dynamics: &Dynamics, shortest_s: f64) -> Steps {
     let own = shooting.steps();
-    let with = |scheme| {
-        let stable_s = longest_stable_step(shooting, dynamics, scheme).max(shortest_s);
-        Steps { scheme, ..own }.at_most(stable_s)
-    };
-    if with(own.scheme) == own {
-        return own;
-    }
-    let evaluations = |steps: &Steps| -> usize {
-        let logs = shooting.logs.iter();
-        logs.map(|log| log.rows() * steps.evaluations(log.median_step()))
-            .sum()
-    };
-    let all = SCHEMES.map(with).into_iter();
-    all.min_by_key(evaluations).expect("there are schemes")
+    own.at_most(longest_stable_step(shooting, dynamics, own.scheme).max(shortest_s))
 }
 
 /// The longest step in s at which every joint of a model comes to rest as it should in steps of a scheme, at the places where the

@@ -23,9 +23,7 @@ pub(crate) use internal::tests::bristles;
 pub use internal::{Case, Course, InternalRates, InternalStart, LoggedMotion, internal_along};
 pub use objective::Objective;
 pub use point::Point;
-pub use scheme::{
-    RK4, SCHEMES, SEMI_IMPLICIT_EULER, STABILISED_RK3, STABILISED_RK3_7, Scheme, Stage,
-};
+pub use scheme::{RK4, SCHEMES, SEMI_IMPLICIT_EULER, STABILISED_RK3, Scheme, Stage};
 pub use sensors::{Sensors, motions, with_own_angles};
 pub use simulator::{Hold, Simulator};
 pub use stepper::Stepper;

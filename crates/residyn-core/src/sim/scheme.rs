@@ -90,46 +90,8 @@ pub const STABILISED_RK3: &Scheme = &Scheme {
     most_swing: 2.33,
 };
 
-/// The same in 7 stages, for friction that is stiffer still: its polynomial 1 + z + z^2/2 + z^3/6 + ... touches zero at z = -3.50 and
-/// -10.58, and stays below 0.3 between and beyond them as far as z = -13.6. Its coefficients were found by Newton's method from random
-/// starts, and of those without negative weights these have the least errors of order 4.
-pub const STABILISED_RK3_7: &Scheme = &Scheme {
-    name: "stabilised_rk3_7",
-    title: "stabilised Runge-Kutta method of order 3 in 7 stages",
-    order: 3,
-    stages: &stages(
-        [
-            0.0,
-            0.148_247_058_740_814_67,
-            0.274_059_261_495_092_8,
-            0.773_709_208_010_992_6,
-            0.802_505_909_218_401_4,
-            0.789_288_871_617_2,
-            0.969_944_111_063_631_5,
-        ],
-        [
-            0.037_883_236_167_926_444,
-            0.149_277_894_001_012_35,
-            0.308_727_235_771_867_06,
-            0.389_022_509_285_495_8,
-            0.104_249_147_268_721_02,
-            0.010_542_697_695_574_766,
-            0.000_297_279_809_402_559_3,
-        ],
-    ),
-    semi_implicit: false,
-    most_damping: 13.59,
-    most_swing: 3.06,
-};
-
 /// Every scheme. A new one is one more entry here.
-pub const SCHEMES: [&Scheme; 5] = [
-    SEMI_IMPLICIT_EULER,
-    HEUN,
-    RK4,
-    STABILISED_RK3,
-    STABILISED_RK3_7,
-];
+pub const SCHEMES: [&Scheme; 4] = [SEMI_IMPLICIT_EULER, HEUN, RK4, STABILISED_RK3];
 
 impl Scheme {
     /// The scheme of this name.

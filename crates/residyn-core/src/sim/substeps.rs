@@ -26,11 +26,6 @@ impl Steps {
             ..self
         }
     }
-
-    /// How often the model is evaluated over a step of this length.
-    pub fn evaluations(&self, length_s: f64) -> usize {
-        self.scheme.stages.len() * substeps(&Row([length_s]), self.longest_s)
-    }
 }
 
 /// In fits, and in motions designed for them: at 2 ms Runge-Kutta methods are accurate, and stable with dry friction smoothed to
