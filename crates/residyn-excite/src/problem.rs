@@ -137,23 +137,6 @@ impl Problem {
         Ok(problem)
     }
 
-    /// Those of some states in which a command holds the model: no motor that saturates pushes harder.
-    fn held(&self, states: Motion) -> Motion {
-        let n = self.joints();
-        let count = states[0].len() / n;
-        let along = self.balance.along(&vec![0.0; count], &states);
-        let entries = along.slopes.len() / count;
-        let of_state = |state: usize| &along.slopes[entries * state..][..entries];
-        let is_held: Vec<bool> = (0..count)
-            .map(|state| of_state(state).iter().all(|slope| slope.is_finite()))
-            .collect();
-        states.map(|channel| {
-            let of_states = channel.chunks(n).zip(&is_held);
-            let held = of_states.filter(|(_, is_held)| **is_held);
-            held.flat_map(|(state, _)| state).copied().collect()
-        })
-    }
-
     /// What random states within the limits show.
     fn base_of_states(&self, limits: &Limits, rng: &mut impl Rng) -> Result<Base, ExciteError> {
         let mut motion: Motion = Default::default();
@@ -170,12 +153,19 @@ impl Problem {
                 }
             }
         }
-        let motion = self.held(motion);
-        let times = vec![0.0; motion[0].len() / self.joints()];
-        if times.is_empty() {
+        let mut along = self.balance.along(&vec![0.0; STATES], &motion);
+        let entries = self.balance.entries.len();
+        let mut is_driven = entries == 0;
+        for slopes in along.slopes.chunks_exact_mut(entries.max(1)) {
+            match slopes.iter().all(|slope| slope.is_finite()) {
+                true => is_driven = true,
+                // No command holds the model there, as beyond a motor's saturation: the state shows nothing.
+                false => slopes.fill(0.0),
+            }
+        }
+        if !is_driven {
             return Err(ExciteError::NotFinite);
         }
-        let along = self.balance.along(&times, &motion);
         let all: Vec<usize> = (0..self.parameters.active.len()).collect();
         let regressor = self.regressor(&along, &all);
         Ok(self.parameters.independent(&regressor))
