@@ -2,20 +2,18 @@
 //!
 //! The work matches `benches/peers.py`: the same models and the same numbers of transitions, candidates and steps.
 
+mod demo;
 mod search;
 mod work;
 
 use std::hint::black_box;
-use std::path::Path;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use residyn::read_plant;
 use residyn_control::plan::Start;
-use residyn_core::closeloop;
-use residyn_core::closeloop::{Request, Split, close_loop};
+use residyn_core::closeloop::{Request, close_loop};
 use residyn_core::lanes::{Arch, Element, Simd, Vector, WithSimd};
 use residyn_core::model::{Dynamics, Library, MlpSettings, MlpWeights};
 use residyn_core::sim::batch::{Rollouts, Rows};
@@ -174,11 +172,8 @@ fn lanes(arch: Arch) -> usize {
 /// The logs of `residyn closeloop` without arguments, from the declared model to the named effect.
 fn identify(c: &mut Criterion) {
     let library = Library::built_in();
-    let demo = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/demo.toml"));
-    let rig = read_plant(demo, &library).expect("the demo's rig");
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let logs = (0..rig.recording.logs).map(|_| rig.record(&mut rng).expect("a log"));
-    let split = Split::of(logs.collect(), &closeloop::Settings::default().split);
+    let split = demo::recorded(&demo::rig(&library), &mut rng);
     let system = library.model("pendulum").expect("a built-in system");
     let mut group = c.benchmark_group("identify");
     group.sample_size(10).bench_function("demo", |b| {
