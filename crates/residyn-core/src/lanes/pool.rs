@@ -1,30 +1,71 @@
 //! A worker pool for many short parallel loops. A loop of a tenth of a millisecond is over before a sleeping thread has
 //! woken up, so the workers here stay awake from one loop to the next.
 
+use std::hint::spin_loop;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread::yield_now;
 use std::time::Duration;
 
-/// How often an idle worker polls for a task, yielding in between (about a millisecond in all), before it starts to
-/// sleep between polls.
-const POLLS_AWAKE: usize = 4096;
+/// How often a waiting thread polls (for tens of microseconds) before it yields between polls. A thread that yields to one
+/// with other work has its core back only after milliseconds, in which many loops could have run.
+const POLLS_SPINNING: usize = 1024;
+/// How often an idle worker polls (for about a millisecond) before it starts to sleep between polls.
+const POLLS_AWAKE: usize = POLLS_SPINNING + 4096;
 const SLEEP: Duration = Duration::from_micros(100);
 
-/// The tasks of the current loop. The calling thread takes tasks as the workers do and never waits for a worker that
-/// has not started, so nested loops on the same threads cannot deadlock.
-#[derive(Debug, Default)]
+/// The tasks of the current loop, in one queue per thread: in every loop a thread begins with the same tasks, whose data
+/// are in its cache, and helps the others when its own are taken. The calling thread takes tasks as the workers do and
+/// never waits for a worker that has not started, so nested loops on the same threads cannot deadlock.
+#[derive(Debug)]
 pub struct WorkerPool {
-    /// Number of the loop (32 bits), how many tasks it has (16), and how many of them are taken (16).
-    state: AtomicU64,
+    queues: Vec<Queue>,
     /// Tasks that are not done.
     unfinished: AtomicUsize,
     stop: AtomicBool,
 }
 
+/// Successive tasks of a loop: its number (32 bits), the first task that belongs to the next queue (16), and the next task
+/// to take (16). Queues do not share a cache line, nor the two that are fetched at once.
+#[derive(Debug, Default)]
+#[repr(align(128))]
+struct Queue(AtomicU64);
+
+impl Queue {
+    /// Begin the next loop with the tasks of this range.
+    fn begin(&self, tasks: Range<usize>) {
+        let number = (self.0.load(Ordering::Relaxed) >> 32) + 1;
+        let state = number << 32 | (tasks.end as u64) << 16 | tasks.start as u64;
+        self.0.store(state, Ordering::Release);
+    }
+
+    /// Take a task of the current loop.
+    fn take(&self) -> Option<usize> {
+        let next = |state: u64| {
+            let (end, next) = (state >> 16 & 0xffff, state & 0xffff);
+            (next < end).then_some(state + 1)
+        };
+        let order = (Ordering::AcqRel, Ordering::Acquire);
+        let before = self.0.fetch_update(order.0, order.1, next).ok()?;
+        Some((before & 0xffff) as usize)
+    }
+}
+
+impl Default for WorkerPool {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl WorkerPool {
-    /// A pool without a task.
+    /// A pool without a task, for as many threads as rayon's pool has.
     pub fn new() -> Self {
-        Self::default()
+        let queues = (0..rayon::current_num_threads()).map(|_| Queue::default());
+        Self {
+            queues: queues.collect(),
+            unfinished: AtomicUsize::new(0),
+            stop: AtomicBool::new(false),
+        }
     }
 
     /// Call `body` while worker threads take part in every [`WorkerPool::run`] within it, each of which must be given
@@ -38,8 +79,8 @@ impl WorkerPool {
         self.stop.store(false, Ordering::Release);
         std::thread::scope(|scope| {
             let _stop = StopOnDrop(self);
-            for _ in 0..workers {
-                scope.spawn(|| self.serve(work));
+            for worker in 1..=workers {
+                scope.spawn(move || self.serve(worker, work));
             }
             body()
         })
@@ -50,50 +91,55 @@ impl WorkerPool {
     /// # Panics
     /// When there are more than 65 535 tasks.
     pub fn run(&self, tasks: usize, work: &impl Fn(usize)) {
-        let tasks = u16::try_from(tasks).expect("at most 65 535 tasks");
-        let number = (self.state.load(Ordering::Relaxed) >> 32) + 1;
-        self.unfinished.store(usize::from(tasks), Ordering::Relaxed);
-        self.state
-            .store(number << 32 | u64::from(tasks) << 16, Ordering::Release);
-        while let Some(task) = self.take() {
+        let tasks = usize::from(u16::try_from(tasks).expect("at most 65 535 tasks"));
+        self.unfinished.store(tasks, Ordering::Relaxed);
+        let count = self.queues.len();
+        for (k, queue) in self.queues.iter().enumerate() {
+            queue.begin(k * tasks / count..(k + 1) * tasks / count);
+        }
+        while let Some(task) = self.take(0) {
             self.call(work, task);
         }
+        let mut polls = 0;
         while self.unfinished.load(Ordering::Acquire) > 0 {
             // With fewer cores than threads, the worker that is waited for may need this core.
-            yield_now();
+            wait(polls);
+            polls += 1;
         }
     }
 
     /// What a worker does until the pool stops.
-    fn serve(&self, work: &impl Fn(usize)) {
+    fn serve(&self, worker: usize, work: &impl Fn(usize)) {
         let mut polls = 0;
         while !self.stop.load(Ordering::Acquire) {
-            if let Some(task) = self.take() {
+            if let Some(task) = self.take(worker) {
                 self.call(work, task);
                 polls = 0;
-            } else if polls < POLLS_AWAKE {
-                polls += 1;
-                yield_now();
             } else {
-                std::thread::sleep(SLEEP);
+                wait(polls);
+                polls += 1;
             }
         }
     }
 
-    /// Take a task of the current loop.
-    fn take(&self) -> Option<usize> {
-        let next = |state: u64| {
-            let (tasks, taken) = (state >> 16 & 0xffff, state & 0xffff);
-            (taken < tasks).then_some(state + 1)
-        };
-        let order = (Ordering::AcqRel, Ordering::Acquire);
-        let before = self.state.fetch_update(order.0, order.1, next).ok()?;
-        Some((before & 0xffff) as usize)
+    /// Take a task of this thread's queue, or else of the next one that has one.
+    fn take(&self, thread: usize) -> Option<usize> {
+        let (before, from) = self.queues.split_at(thread % self.queues.len());
+        from.iter().chain(before).find_map(Queue::take)
     }
 
     fn call(&self, work: &impl Fn(usize), task: usize) {
         let _done = DoneOnDrop(&self.unfinished);
         work(task);
+    }
+}
+
+/// Wait until the next poll, after this many.
+fn wait(polls: usize) {
+    match polls {
+        ..POLLS_SPINNING => spin_loop(),
+        ..POLLS_AWAKE => yield_now(),
+        _ => std::thread::sleep(SLEEP),
     }
 }
 
