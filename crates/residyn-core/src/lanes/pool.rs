@@ -138,7 +138,7 @@ impl WorkerPool {
 fn wait(polls: usize) {
     match polls {
         ..POLLS_SPINNING => spin_loop(),
-        ..POLLS_AWAKE => yield_now(),
+        POLLS_SPINNING..POLLS_AWAKE => yield_now(),
         _ => std::thread::sleep(SLEEP),
     }
 }
